@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/program.hpp"
 
-int main(int argc, char** argv) {
-  return palpate::app::run_program(argc, argv);
-}
+int main(int argc, char** argv) { return palpate::app::run_program(argc, argv); }

@@ -5,8 +5,6 @@
 
 namespace palpate::app {
 
-MethodRegistry program_methods(const Source* /*camera*/) {
-  return standard_methods();
-}
+MethodRegistry program_methods(const Source* /*camera*/) { return standard_methods(); }
 
 }  // namespace palpate::app

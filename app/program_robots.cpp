@@ -3,13 +3,9 @@
 
 namespace palpate::app {
 
-Cell open_cell(const std::string& uri) {
-  return open_standard_cell(uri);
-}
+Cell open_cell(const std::string& uri) { return open_standard_cell(uri); }
 
-std::string usual_cell() {
-  return "synthetic:desk?sensor=d4xx";
-}
+std::string usual_cell() { return "synthetic:desk?sensor=d4xx"; }
 
 std::string robots_help() {
   return "robot, with its camera if it has one (" + usual_cell() + "): " + standard_robots_help();

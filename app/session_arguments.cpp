@@ -105,9 +105,7 @@ void SessionArguments::add_to(CLI::App& command) {
   command.get_option("--config")->description("read the session from a TOML file");
 }
 
-bool SessionArguments::names_cameras() const {
-  return !cameras_.empty() || method_.has_file();
-}
+bool SessionArguments::names_cameras() const { return !cameras_.empty() || method_.has_file(); }
 
 SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   SessionConfig config = method_.session(methods);

@@ -73,8 +73,6 @@ Interruption::~Interruption() {
     sigaction(interrupting[i], &before_[i], nullptr);
 }
 
-int Interruption::signal() const noexcept {
-  return interrupted_by;
-}
+int Interruption::signal() const noexcept { return interrupted_by; }
 
 }  // namespace palpate::app

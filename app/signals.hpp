@@ -47,8 +47,6 @@ class Interruption {
 };
 
 /// The exit status of a program that a signal ended, as shells give it.
-constexpr int exit_status_of(int signal) noexcept {
-  return 128 + signal;
-}
+constexpr int exit_status_of(int signal) noexcept { return 128 + signal; }
 
 }  // namespace palpate::app

@@ -41,12 +41,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string word_of(const Json& value) {
-  return value.get<std::string>();
-}
-double number_of(const Json& value) {
-  return value.get<double>();
-}
+std::string word_of(const Json& value) { return value.get<std::string>(); }
+double number_of(const Json& value) { return value.get<double>(); }
 
 struct DoctorOptions {
   double seconds = 3.0;

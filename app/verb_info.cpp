@@ -38,9 +38,7 @@ struct InfoOptions {
 };
 
 // To six digits: what a camera measures has fewer.
-double rounded(double value) {
-  return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr);
-}
+double rounded(double value) { return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr); }
 
 Json numbers(const Vec3& v) {
   return Json::array({rounded(v.x()), rounded(v.y()), rounded(v.z())});

@@ -323,9 +323,7 @@ class PipeMethod final : public LabMethod, public FallibleMethod {
 
 }  // namespace
 
-bool is_pipe(std::string_view name) {
-  return name.starts_with(scheme);
-}
+bool is_pipe(std::string_view name) { return name.starts_with(scheme); }
 
 std::unique_ptr<Method> make_pipe_method(std::string_view name, const Parameters& parameters,
                                          std::chrono::milliseconds patience) {

@@ -64,9 +64,7 @@ double median(std::vector<double> values);
 
 /// A field of a CSV: numbers in the shortest form that reads back to the same value.
 std::string csv_field(double number);
-inline std::string csv_field(std::string_view text) {
-  return std::string(text);
-}
+inline std::string csv_field(std::string_view text) { return std::string(text); }
 template <std::integral Whole>
 std::string csv_field(Whole number) {
   return std::to_string(static_cast<long long>(number));

@@ -11,13 +11,9 @@
 namespace palpate::python {
 namespace {
 
-std::array<double, 3> numbers(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
+std::array<double, 3> numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-std::array<double, 4> numbers(const Rotation& q) {
-  return {q.x(), q.y(), q.z(), q.w()};
-}
+std::array<double, 4> numbers(const Rotation& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
 template <class Record>
 py::array copied(const std::vector<Record>& records) {
@@ -74,13 +70,9 @@ Points rows_of(const std::vector<Vec3>& points) {
                                   static_cast<Eigen::Index>(points.size()), 3);
 }
 
-py::array array_of(const std::vector<TickRecord>& ticks) {
-  return copied(ticks);
-}
+py::array array_of(const std::vector<TickRecord>& ticks) { return copied(ticks); }
 
-py::array array_of(const std::vector<CycleRecord>& ticks) {
-  return copied(ticks);
-}
+py::array array_of(const std::vector<CycleRecord>& ticks) { return copied(ticks); }
 
 void check_shape(const py::array& array, const std::string& name,
                  const std::vector<py::ssize_t>& shape, const std::string& give) {

@@ -85,9 +85,7 @@ std::unique_ptr<Robot> SimulatedCell::robot() const {
   return std::make_unique<SimulatedRobot>(simulation_, uri_.text());
 }
 
-std::unique_ptr<Source> SimulatedCell::camera() const {
-  return make_camera(uri_, simulation_);
-}
+std::unique_ptr<Source> SimulatedCell::camera() const { return make_camera(uri_, simulation_); }
 
 SourceScheme SimulatedCell::source_scheme() const {
   return {"mujoco", "mujoco:desk?KEY=VALUE&...: the camera of the robot's simulated cell",

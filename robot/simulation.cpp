@@ -62,9 +62,7 @@ struct DataDeleter {
 
 // What MuJoCo calls where it would end the process. The exception passes through its C frames,
 // which hold nothing but memory of the mjData that is not used again.
-void throw_error(const char* message) {
-  throw std::runtime_error(message);
-}
+void throw_error(const char* message) { throw std::runtime_error(message); }
 
 // Else it writes to MUJOCO_LOG.TXT. Warnings are counted in mjData, where `failure` reads them.
 void ignore_warning(const char* /*message*/) {}
@@ -121,9 +119,7 @@ std::vector<double> numbers(const mjModel& model, const char* name, int count) {
   return {first, first + count};
 }
 
-Vec3 vector(const mjtNum* from) {
-  return Eigen::Map<const Vec3>(from);
-}
+Vec3 vector(const mjtNum* from) { return Eigen::Map<const Vec3>(from); }
 
 Eigen::Isometry3d isometry(const mjtNum* position, const mjtNum* quaternion) {
   return Eigen::Translation3d(vector(position)) *
@@ -561,9 +557,7 @@ Simulation::Simulation(std::string_view mjcf, const SimulationSetup& setup)
 Simulation::Simulation(const SimulationSetup& setup)
     : Simulation(desk_model(checked_hole(setup)), setup) {}
 
-Simulation::~Simulation() {
-  stop();
-}
+Simulation::~Simulation() { stop(); }
 
 void Simulation::start() {
   if (runs()) return;
@@ -579,13 +573,9 @@ void Simulation::start() {
       1000.0, ordinary, [&own](const Wake& wake) { own.catch_up(wake.t); });
 }
 
-void Simulation::stop() {
-  implementation_->thread_.reset();
-}
+void Simulation::stop() { implementation_->thread_.reset(); }
 
-bool Simulation::runs() const {
-  return implementation_->thread_ != nullptr;
-}
+bool Simulation::runs() const { return implementation_->thread_ != nullptr; }
 
 void Simulation::advance(double t) {
   Implementation& own = *implementation_;
@@ -595,13 +585,9 @@ void Simulation::advance(double t) {
   while (own.steps_ < wanted && own.state_.fault.empty()) own.step();
 }
 
-double Simulation::step_length() const {
-  return implementation_->model_->opt.timestep;
-}
+double Simulation::step_length() const { return implementation_->model_->opt.timestep; }
 
-const RobotInfo& Simulation::info() const {
-  return implementation_->info_;
-}
+const RobotInfo& Simulation::info() const { return implementation_->info_; }
 
 void Simulation::command(const Vec3& position, const Vec3& velocity) noexcept {
   if (position.allFinite() && velocity.allFinite())
@@ -652,9 +638,7 @@ double Simulation::max_torque_share() const {
   return implementation_->max_torque_share_;
 }
 
-const std::vector<VisibleGeom>& Simulation::geoms() const {
-  return implementation_->geoms_;
-}
+const std::vector<VisibleGeom>& Simulation::geoms() const { return implementation_->geoms_; }
 
 BodyPoses Simulation::poses(double t) const {
   const std::lock_guard lock(implementation_->mutex_);

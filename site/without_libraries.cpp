@@ -23,9 +23,7 @@ namespace {
 
 }  // namespace
 
-std::vector<Driver> listed_drivers() {
-  return {};
-}
+std::vector<Driver> listed_drivers() { return {}; }
 
 bool is_zstd(std::span<const std::byte> bytes) noexcept {
   constexpr unsigned char magic[] = {0x28, 0xb5, 0x2f, 0xfd};

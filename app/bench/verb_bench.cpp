@@ -46,9 +46,7 @@ struct BenchOptions {
   std::string out = ".";
 };
 
-double budget_of(const BenchOptions& options) {
-  return options.quick ? 0.001 : 0.25;
-}
+double budget_of(const BenchOptions& options) { return options.quick ? 0.001 : 0.25; }
 
 // Resident memory of this process [bytes].
 std::size_t resident() {

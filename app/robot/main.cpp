@@ -15,9 +15,7 @@ Cell open_cell(const std::string& uri) {
           .on_frame = [](const FedFrame& /*frame*/) {}};  // both are on the loop's clock
 }
 
-std::string usual_cell() {
-  return "mujoco:desk?sensor=d4xx&size=320x240";
-}
+std::string usual_cell() { return "mujoco:desk?sensor=d4xx&size=320x240"; }
 
 std::string robots_help() {
   return "robot, with its camera if it has one (" + usual_cell() +
@@ -26,6 +24,4 @@ std::string robots_help() {
 
 }  // namespace palpate::app
 
-int main(int argc, char** argv) {
-  return palpate::app::run_program(argc, argv);
-}
+int main(int argc, char** argv) { return palpate::app::run_program(argc, argv); }

@@ -28,9 +28,7 @@ constexpr std::string_view firm = "firm";    // a firm grip on a Touch
 constexpr std::string_view free_handle = "free";
 constexpr std::string_view chain = "chain";  // the light grip, or the free handle, by the chain
 
-const DevicePreset& touch() {
-  return device_preset("touch");
-}
+const DevicePreset& touch() { return device_preset("touch"); }
 
 // What a camera shows, and the truth about it.
 struct Stage {

@@ -165,9 +165,7 @@ SyntheticCamera look_at(const Scene& scene, double distance, std::uint64_t seed)
 
 // How far above the surface a hand is that comes down to it at 0.15 m/s: in contact after 0.4 s.
 constexpr double contact_time = 0.4;  // [s]
-double coming_down(double t) {
-  return std::max(0.15 * (contact_time - t), -press);
-}
+double coming_down(double t) { return std::max(0.15 * (contact_time - t), -press); }
 
 // Something at rest under a real camera's noise, watched for a second after a second of contact.
 std::string rest_in_sight(const std::string& name, const ExperimentOptions& options,
@@ -332,9 +330,7 @@ Scores fidelity_scores(const Table& table) {
 
 }  // namespace
 
-std::span<const FidelityMeasure> fidelity_measures() {
-  return measures;
-}
+std::span<const FidelityMeasure> fidelity_measures() { return measures; }
 
 bool is_without_chance(std::string_view scene) {
   return scene == "quiet-plane" || scene == "quiet-relief" || scene == "sine";

@@ -121,9 +121,7 @@ struct Extra {
   std::string_view note;
 };
 
-std::vector<std::string> step_values(const Sum& sum) {
-  return {median_text(sum.steps)};
-}
+std::vector<std::string> step_values(const Sum& sum) { return {median_text(sum.steps)}; }
 
 std::vector<std::string> rest_values(const Sum& sum) {
   const auto worst = std::max_element(sum.shakes.begin(), sum.shakes.end());

@@ -151,9 +151,7 @@ bool predicted_safe(double a, double s, double r_1) {
   return r_1 + printed_h(s) > a / (f_c * f_c) + v / f_c * printed_e(s);
 }
 
-std::string percent(double share) {
-  return fmt::format("{:.1f} %", 100.0 * share);
-}
+std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
 std::vector<Claim> lift_claims(const Table& table) {
   constexpr double r_c = 5e-3;

@@ -546,9 +546,7 @@ constexpr std::array families = {
 
 }  // namespace
 
-double rounded(double value) {
-  return std::strtod(fmt::format("{:.3g}", value).c_str(), nullptr);
-}
+double rounded(double value) { return std::strtod(fmt::format("{:.3g}", value).c_str(), nullptr); }
 
 Chance chance_of(std::string_view name, std::uint64_t seed, std::uint64_t index) {
   // FNV-1a of the name: a new family changes no other.
@@ -572,9 +570,7 @@ std::string PopCase::text() const {
   return result + fmt::format("seed={}", seed);
 }
 
-std::span<const PopFamily> pop_families() {
-  return families;
-}
+std::span<const PopFamily> pop_families() { return families; }
 
 const PopFamily& find_pop_family(std::string_view name) {
   return find_named(families, name, "family", "there is no such family of cases");

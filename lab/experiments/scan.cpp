@@ -53,9 +53,7 @@ Vec3 scan_hip(double t) {
   return Vec3::Zero();
 }
 
-double scan_duration() {
-  return scan_length(scan_path.size() - 1) / scan_speed;
-}
+double scan_duration() { return scan_length(scan_path.size() - 1) / scan_speed; }
 
 std::shared_ptr<SyntheticCamera> camera_over_desk(std::uint64_t seed) {
   return open_synthetic_camera(Uri("synthetic:desk?sensor=kinect&seed=" + std::to_string(seed)));

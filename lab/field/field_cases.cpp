@@ -12,9 +12,7 @@
 namespace palpate::lab::field {
 namespace {
 
-double cotangent(double x) {
-  return math::cos(x) / math::sin(x);
-}
+double cotangent(double x) { return math::cos(x) / math::sin(x); }
 
 constexpr double edge_feature = 0.010;  // [m] the sphere on an edge: two r_c
 
@@ -66,9 +64,7 @@ Pressing resting(Draw& draw, double seconds) {
   return p;
 }
 // [s] from when it begins to come down until that happens.
-double settled(const Pressing& p) {
-  return seconds_for(p.hover + p.depth, p.speed) + before_it;
-}
+double settled(const Pressing& p) { return seconds_for(p.hover + p.depth, p.speed) + before_it; }
 
 // Down on a place, pressed for a while, and away again.
 Script press_and_lift(const Place& place, const Pressing& p, double start) {
@@ -127,9 +123,7 @@ std::function<Eigen::Isometry3d(double)> arm_motion(const Vec3& fingertips, doub
 
 // ---- Geometries. ----
 
-FieldScene plane_scene(Draw& /*draw*/) {
-  return {still(ground())};
-}
+FieldScene plane_scene(Draw& /*draw*/) { return {still(ground())}; }
 
 FieldScene bowl_scene(Draw& draw) {
   const double inner = draw.even("bowl", 0.035, 0.08);

@@ -25,9 +25,7 @@ constexpr double long_rest = 0.5;      // [s] and that they rest on for it to co
 constexpr double moves = 1e-7;         // [m] in a tick: what moves by less rests
 constexpr double just_before = 0.002;  // [m] from the sphere: what is met there is what it touches
 
-bool inside(const Snapshot& scene, const Vec3& place) {
-  return scene.distance(place) < 0.0;
-}
+bool inside(const Snapshot& scene, const Vec3& place) { return scene.distance(place) < 0.0; }
 
 // Through a thin body there is no inside: on its far side a proxy is hidden from the camera, and
 // the straight way from the ruler's proxy leads through the body.

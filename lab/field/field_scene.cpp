@@ -31,9 +31,7 @@ std::optional<double> ahead(double entry, double exit, double reach) {
   return std::max(entry, 0.0);
 }
 
-ShapePtr solid(Shape shape) {
-  return std::make_shared<const Shape>(std::move(shape));
-}
+ShapePtr solid(Shape shape) { return std::make_shared<const Shape>(std::move(shape)); }
 
 struct Height {
   double z;
@@ -321,9 +319,7 @@ std::pair<const Snapshot::Part*, double> Snapshot::nearest_part(const Vec3& p) c
   return nearest;
 }
 
-double Snapshot::distance(const Vec3& p) const {
-  return nearest_part(p).second;
-}
+double Snapshot::distance(const Vec3& p) const { return nearest_part(p).second; }
 
 TruePoint Snapshot::nearest(const Vec3& p) const {
   const auto [part, distance] = nearest_part(p);

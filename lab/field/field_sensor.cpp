@@ -40,9 +40,7 @@ const std::vector<double>& normal_quantiles() {
 
 }  // namespace
 
-double Chance::normal() {
-  return normal_quantiles()[bits() >> (64U - table_bits)];
-}
+double Chance::normal() { return normal_quantiles()[bits() >> (64U - table_bits)]; }
 
 void Chance::fill_normal(std::span<double> out) {
   const std::vector<double>& table = normal_quantiles();

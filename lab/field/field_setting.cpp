@@ -24,9 +24,7 @@ Script& Script::wait(double seconds) {
   return follow(seconds, [place = end_](double) { return place; });
 }
 
-Script& Script::reach(const Vec3& to, double speed) {
-  return stroke({end_, to}, speed);
-}
+Script& Script::reach(const Vec3& to, double speed) { return stroke({end_, to}, speed); }
 
 Script& Script::stroke(const std::vector<Vec3>& places, double speed) {
   std::vector<double> gone = {0.0};
@@ -98,12 +96,8 @@ double Draw::given(std::string_view key, double drawn, double low, double high) 
   return value.value;
 }
 
-Eigen::Isometry3d at(const Vec3& place) {
-  return Eigen::Isometry3d(Eigen::Translation3d(place));
-}
-Eigen::Isometry3d at(double x, double y, double z) {
-  return at(Vec3(x, y, z));
-}
+Eigen::Isometry3d at(const Vec3& place) { return Eigen::Isometry3d(Eigen::Translation3d(place)); }
+Eigen::Isometry3d at(double x, double y, double z) { return at(Vec3(x, y, z)); }
 Eigen::Isometry3d turned(double angle, const Vec3& axis) {
   return Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
 }
@@ -113,9 +107,7 @@ Body still(ShapePtr shape, const Eigen::Isometry3d& place) {
 Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion) {
   return {std::move(shape), Eigen::Isometry3d::Identity(), std::move(motion)};
 }
-Vec3 toward(double heading) {
-  return {math::cos(heading), math::sin(heading), 0.0};
-}
+Vec3 toward(double heading) { return {math::cos(heading), math::sin(heading), 0.0}; }
 
 Place below(const FieldScene& scene, double x, double y, double t, double from) {
   const Snapshot snapshot(scene, t);
@@ -125,9 +117,7 @@ Place below(const FieldScene& scene, double x, double y, double t, double from) 
   return {point, snapshot.nearest(point + 1e-4 * Vec3::UnitZ()).normal};
 }
 
-double seconds_for(double way, double fastest) {
-  return 1.875 * way / fastest;
-}
+double seconds_for(double way, double fastest) { return 1.875 * way / fastest; }
 
 void play_script(Setting& setting, const Script& script) {
   setting.duration = script.duration();

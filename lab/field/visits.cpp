@@ -11,16 +11,10 @@
 namespace palpate::lab::field {
 namespace {
 
-Vec3 up(double z) {
-  return {0.0, 0.0, z};
-}
+Vec3 up(double z) { return {0.0, 0.0, z}; }
 
-double rate_of(Draw& draw) {
-  return draw.by_factor("rate", 5.0, 90.0);
-}
-double latency_of(Draw& draw) {
-  return draw.even("latency", 0.0, 0.12);
-}
+double rate_of(Draw& draw) { return draw.by_factor("rate", 5.0, 90.0); }
+double latency_of(Draw& draw) { return draw.even("latency", 0.0, 0.12); }
 
 // [m/s] of what comes against the hand, which goes so far while a frame is on its way.
 double pushing(Draw& draw) {
@@ -143,14 +137,10 @@ struct Visitor {
   }
 };
 
-double carrying(Draw& draw) {
-  return draw.by_factor("carry", 0.4, 1.2);
-}
+double carrying(Draw& draw) { return draw.by_factor("carry", 0.4, 1.2); }
 
 // Where an arm comes from that points along a way.
-Vec3 behind(const Vec3& way) {
-  return -0.35 * way + up(0.12);
-}
+Vec3 behind(const Vec3& way) { return -0.35 * way + up(0.12); }
 
 // ---- Boxes, sheets and other things. ----
 

@@ -86,9 +86,7 @@ constexpr std::uint32_t largest_domain = 232;
 constexpr double blocking_time = 0.05;
 constexpr std::size_t most_publications = 4096;
 
-Duration duration(double seconds) {
-  return static_cast<Duration>(std::llround(1e9 * seconds));
-}
+Duration duration(double seconds) { return static_cast<Duration>(std::llround(1e9 * seconds)); }
 
 std::string variable(const char* name) {
   const char* value = std::getenv(name);
@@ -255,9 +253,7 @@ std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) 
   return code;
 }
 
-ros::Time stamp_of(double monotonic) {
-  return ros::Time::at(since_1970(monotonic));
-}
+ros::Time stamp_of(double monotonic) { return ros::Time::at(since_1970(monotonic)); }
 
 std::string dds_type(std::string_view type) {
   std::string name(type);
@@ -293,9 +289,7 @@ Participant::Participant(const std::string& who, std::string_view user_data)
   check(std::min(waitset_, publications_), "it cannot look at the network");
 }
 
-Participant::~Participant() {
-  library_->remove(entity_);
-}
+Participant::~Participant() { library_->remove(entity_); }
 
 void Participant::check(int entity, const std::string& what) const {
   if (entity >= 0) return;
@@ -303,9 +297,7 @@ void Participant::check(int entity, const std::string& what) const {
               "check CYCLONEDDS_URI, ROS_LOCALHOST_ONLY and the network interfaces");
 }
 
-const std::string& Participant::library_path() const {
-  return library_->library.path();
-}
+const std::string& Participant::library_path() const { return library_->library.path(); }
 
 void Participant::each_publication(const std::function<void(const Endpoint&)>& use) {
   std::vector<void*> samples(most_publications, nullptr);
@@ -349,9 +341,7 @@ Generation Participant::generation() {
   return found;
 }
 
-Guid Participant::guid() const {
-  return guid_of(*library_, entity_);
-}
+Guid Participant::guid() const { return guid_of(*library_, entity_); }
 
 void Participant::wait(double seconds) {
   library_->wait(waitset_, nullptr, 0, duration(std::max(seconds, 0.0)));
@@ -393,9 +383,7 @@ Reader::Reader(Participant& participant, const std::string& topic, std::string_v
   library.attach(participant.waitset_, entity_, 0);
 }
 
-Reader::~Reader() {
-  participant_.library_->remove(entity_);
-}
+Reader::~Reader() { participant_.library_->remove(entity_); }
 
 bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
   const Library& library = *participant_.library_;
@@ -438,9 +426,7 @@ Writer::Writer(Participant& participant, const std::string& topic, std::string_v
   participant.check(entity_, "it cannot write " + topic);
 }
 
-Writer::~Writer() {
-  participant_.library_->remove(entity_);
-}
+Writer::~Writer() { participant_.library_->remove(entity_); }
 
 bool Writer::write_sample(const ros::CSample& sample) {
   return participant_.library_->write(entity_, sample.data()) >= 0;
@@ -454,13 +440,9 @@ int Writer::readers() const {
   return std::max(participant_.library_->matched_readers(entity_, nullptr, 0), 0);
 }
 
-Guid Reader::guid() const {
-  return guid_of(*participant_.library_, entity_);
-}
+Guid Reader::guid() const { return guid_of(*participant_.library_, entity_); }
 
-Guid Writer::guid() const {
-  return guid_of(*participant_.library_, entity_);
-}
+Guid Writer::guid() const { return guid_of(*participant_.library_, entity_); }
 
 Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies) {
   const Library& library = *replies.participant_.library_;

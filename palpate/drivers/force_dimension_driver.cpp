@@ -162,12 +162,8 @@ const Model& model_of(int type) {
 }
 
 // The SDK's axes are x towards the user, y to the right, z up.
-Vec3 from_arm(double x, double y, double z) {
-  return {y, -x, z};
-}
-Vec3 to_arm(const Vec3& v) {
-  return {-v.y(), v.x(), v.z()};
-}
+Vec3 from_arm(double x, double y, double z) { return {y, -x, z}; }
+Vec3 to_arm(const Vec3& v) { return {-v.y(), v.x(), v.z()}; }
 
 struct Wanted {
   std::string uri;

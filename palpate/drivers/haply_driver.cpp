@@ -116,9 +116,7 @@ Vec3 vector_of(const Json& object, const char* name, const Vec3& fallback) {
           vector.value("z", fallback.z())};
 }
 
-Json devices_in(const Json& message) {
-  return message.value("inverse3", Json::array());
-}
+Json devices_in(const Json& message) { return message.value("inverse3", Json::array()); }
 
 // The device of that id in a message, or the first if `id` is empty; null if there is none.
 Json device_in(const Json& message, const std::string& id) {

@@ -173,12 +173,8 @@ const Model& model_of(std::string_view type) {
 }
 
 // OpenHaptics' axes are x to the right, y up, z towards the user.
-Vec3 from_device(const double* v) {
-  return {v[0], -v[2], v[1]};
-}
-std::array<double, 3> to_device(const Vec3& v) {
-  return {v.x(), v.z(), -v.y()};
-}
+Vec3 from_device(const double* v) { return {v[0], -v[2], v[1]}; }
+std::array<double, 3> to_device(const Vec3& v) { return {v.x(), v.z(), -v.y()}; }
 
 struct Wanted {
   std::string uri, name;

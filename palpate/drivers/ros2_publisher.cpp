@@ -37,15 +37,9 @@ std::string checked_name(const std::string& name) {
 
 }  // namespace
 
-std::string clock_question_topic(const std::string& camera) {
-  return camera + "/clock/question";
-}
-std::string clock_answer_topic(const std::string& camera) {
-  return camera + "/clock/answer";
-}
-std::string report_topic(const std::string& camera) {
-  return camera + "/slices/report";
-}
+std::string clock_question_topic(const std::string& camera) { return camera + "/clock/question"; }
+std::string clock_answer_topic(const std::string& camera) { return camera + "/clock/answer"; }
+std::string report_topic(const std::string& camera) { return camera + "/slices/report"; }
 
 Ros2CameraPublisher::Ros2CameraPublisher(const std::string& name, DepthPacking packing)
     : name_(checked_name(name)),

@@ -31,9 +31,7 @@ namespace {
 constexpr std::uint32_t wanted_buffers = 4;
 constexpr int most_nodes = 64;
 
-std::string reason() {
-  return std::generic_category().message(errno);
-}
+std::string reason() { return std::generic_category().message(errno); }
 
 std::string remedy() {
   if (errno == EACCES || errno == EPERM)

@@ -24,9 +24,7 @@ std::uint64_t nanoseconds(double seconds) noexcept {
   return static_cast<std::uint64_t>(std::min(seconds, 1e6) * 1e9);
 }
 
-bool is_faulty(const HandState& hand) noexcept {
-  return hand.fault != DeviceFault::none;
-}
+bool is_faulty(const HandState& hand) noexcept { return hand.fault != DeviceFault::none; }
 
 std::uint32_t hand_bits(const HandState& hand) noexcept {
   return (hand.present ? hand_present : 0U) | (hand.clutched ? hand_clutched : 0U) |

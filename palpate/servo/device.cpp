@@ -30,12 +30,8 @@ const Row& row_of(DeviceFault fault) {
 
 }  // namespace
 
-std::string_view to_string(DeviceFault fault) {
-  return row_of(fault).name;
-}
+std::string_view to_string(DeviceFault fault) { return row_of(fault).name; }
 
-std::string_view describe(DeviceFault fault) {
-  return row_of(fault).sentence;
-}
+std::string_view describe(DeviceFault fault) { return row_of(fault).sentence; }
 
 }  // namespace palpate

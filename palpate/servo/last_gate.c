@@ -81,17 +81,11 @@ typedef struct {
 */
 
 /*@ assigns \nothing; ensures \result == greater_of(a, b); */
-INLINE double greater(double a, double b) {
-  return a > b ? a : b;
-}
+INLINE double greater(double a, double b) { return a > b ? a : b; }
 /*@ assigns \nothing; ensures \result == lesser_of(a, b); */
-INLINE double lesser(double a, double b) {
-  return a < b ? a : b;
-}
+INLINE double lesser(double a, double b) { return a < b ? a : b; }
 /*@ assigns \nothing; ensures \result <==> low <= x <= high; */
-INLINE int between(double x, double low, double high) {
-  return x >= low && x <= high;
-}
+INLINE int between(double x, double low, double high) { return x >= low && x <= high; }
 
 /*@ assigns \nothing; ensures \result <==> sound(v); */
 INLINE int is_sound(Vector v) {
@@ -99,24 +93,16 @@ INLINE int is_sound(Vector v) {
 }
 
 /*@ assigns \nothing; ensures \result <==> zero(v); */
-INLINE int is_nothing(Vector v) {
-  return v.x == 0.0 && v.y == 0.0 && v.z == 0.0;
-}
+INLINE int is_nothing(Vector v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
 /*@ assigns \nothing; ensures \result == a.x * b.x + a.y * b.y + a.z * b.z; */
-INLINE double dot(Vector a, Vector b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+INLINE double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 /*@ assigns \nothing; ensures \result <==> no_longer(v, bound); */
-INLINE int is_within(Vector v, double bound) {
-  return is_sound(v) && dot(v, v) <= bound * bound;
-}
+INLINE int is_within(Vector v, double bound) { return is_sound(v) && dot(v, v) <= bound * bound; }
 
 /*@ assigns \nothing; ensures \result == widened(bound); */
-INLINE double widen(double bound) {
-  return bound > 0.0 ? bound * WIDEN + GRAIN : 0.0;
-}
+INLINE double widen(double bound) { return bound > 0.0 ? bound * WIDEN + GRAIN : 0.0; }
 
 /*@ assigns \nothing;
     ensures \result.x == k * v.x && \result.y == k * v.y && \result.z == k * v.z; */
@@ -151,9 +137,7 @@ INLINE double top_of(Channel c, Bounds b, Tick t) {
 }
 
 /*@ assigns \nothing; ensures \result == turn(c, b, t); */
-INLINE double turn_of(Channel c, Bounds b, Tick t) {
-  return b.rise * t.add_time + c.ring + t.ring;
-}
+INLINE double turn_of(Channel c, Bounds b, Tick t) { return b.rise * t.add_time + c.ring + t.ring; }
 
 /* Square of v - kept * last. */
 /*@ assigns \nothing; ensures \result == turn_square(v, kept, last); */
@@ -275,9 +259,7 @@ INLINE int is_good_wish(Wish w) {
 }
 
 /*@ assigns \nothing; */
-INLINE double share_within(double bound, Vector v) {
-  return SHRINK * bound / sqrt(dot(v, v));
-}
+INLINE double share_within(double bound, Vector v) { return SHRINK * bound / sqrt(dot(v, v)); }
 
 /* What supports the handle's weight: nothing at once, and all of it only after HELD_TIME. */
 /*@ requires 0 <= share <= 1 && sound(wish);
@@ -296,15 +278,11 @@ INLINE int is_in_time(struct palpate_gate g, Wish w) {
 }
 
 /*@ requires b > 0; assigns \nothing; ensures \result == a / b; */
-INLINE double ratio(double a, double b) {
-  return a / b;
-}
+INLINE double ratio(double a, double b) { return a / b; }
 
 /*@ requires 0 <= share <= 1 && 0 <= more; assigns \nothing;
     ensures 0 <= \result <= 1 && \result <= share + more; */
-INLINE double raised(double share, double more) {
-  return lesser(1.0, greater(share + more, 0.0));
-}
+INLINE double raised(double share, double more) { return lesser(1.0, greater(share + more, 0.0)); }
 
 /*@ requires good_gate(g) && good_wish(w) && in_time(g, w);
     assigns \nothing;

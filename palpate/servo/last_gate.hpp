@@ -6,12 +6,8 @@
 
 namespace palpate {
 
-inline palpate_gate_vector gate_vector(const Vec3& v) noexcept {
-  return {v.x(), v.y(), v.z()};
-}
-inline Vec3 vector_of(const palpate_gate_vector& v) noexcept {
-  return {v.x, v.y, v.z};
-}
+inline palpate_gate_vector gate_vector(const Vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
+inline Vec3 vector_of(const palpate_gate_vector& v) noexcept { return {v.x, v.y, v.z}; }
 
 /// The last step before a device, and the only one that writes to it (scripts/checks/check.py).
 ///

@@ -17,9 +17,7 @@ void give(PortEnergy& port, double work) noexcept {
   if (port.generates() && !before) ++port.generating;
 }
 
-void begin_contact(PortEnergy& port) noexcept {
-  port.excess = port.most = 0.0;
-}
+void begin_contact(PortEnergy& port) noexcept { port.excess = port.most = 0.0; }
 
 }  // namespace
 

@@ -47,9 +47,7 @@ PeriodicThread::PeriodicThread(double rate, const RealtimeRequest& request,
   report_ = report.get();
 }
 
-PeriodicThread::~PeriodicThread() {
-  stop();
-}
+PeriodicThread::~PeriodicThread() { stop(); }
 
 void PeriodicThread::stop() {
   request_stop();

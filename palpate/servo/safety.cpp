@@ -121,14 +121,10 @@ constexpr std::array table{
 constexpr std::string_view noun = "safety parameter";
 
 // Of what changes with a time constant, the share that `dt` changes.
-double share_of(double dt, double time_constant) {
-  return -math::expm1(-dt / time_constant);
-}
+double share_of(double dt, double time_constant) { return -math::expm1(-dt / time_constant); }
 
 // Hazard: not-a-number
-bool is_sound(const Vec3& v) {
-  return v.allFinite() && v.cwiseAbs().maxCoeff() <= largest;
-}
+bool is_sound(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= largest; }
 
 // Shortens `force` to `limit`; false if it is short enough.
 bool cut_to(double limit, Vec3& force) {
@@ -171,17 +167,11 @@ bool add_within(double limit, const Vec3& more, Vec3& force) {
 
 }  // namespace
 
-std::span<const std::string_view> safety_flag_names() {
-  return flag_names;
-}
+std::span<const std::string_view> safety_flag_names() { return flag_names; }
 
-std::span<const std::string_view> safety_flag_meanings() {
-  return flag_meanings;
-}
+std::span<const std::string_view> safety_flag_meanings() { return flag_meanings; }
 
-std::span<const SafetyParameterInfo> safety_parameter_table() {
-  return table;
-}
+std::span<const SafetyParameterInfo> safety_parameter_table() { return table; }
 
 const SafetyParameterInfo& safety_parameter(std::string_view name) {
   return row_by_name(safety_parameter_table(), name, noun);

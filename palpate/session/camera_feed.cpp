@@ -464,9 +464,7 @@ CameraFeed::CameraFeed(std::unique_ptr<Source> source, FeedOptions options, Open
   worker_ = std::make_shared<Worker>(std::move(source), std::move(options), std::move(open));
 }
 
-CameraFeed::~CameraFeed() {
-  stop();
-}
+CameraFeed::~CameraFeed() { stop(); }
 
 std::optional<Frame> CameraFeed::first_frame(double timeout) {
   return worker_->first_frame(timeout);
@@ -478,9 +476,7 @@ void CameraFeed::start(Sink sink, Hand hand) {
   thread_ = std::thread([worker = worker_] { worker->run(); });
 }
 
-void CameraFeed::request_stop() noexcept {
-  worker_->request_stop();
-}
+void CameraFeed::request_stop() noexcept { worker_->request_stop(); }
 
 bool CameraFeed::join(double timeout) {
   if (!thread_.joinable()) return true;
@@ -510,8 +506,6 @@ void CameraFeed::seek(double share) {
   worker_->seek(share);
 }
 
-CameraStatus CameraFeed::status() const {
-  return worker_->status();
-}
+CameraStatus CameraFeed::status() const { return worker_->status(); }
 
 }  // namespace palpate

@@ -75,9 +75,7 @@ std::string toml(std::string_view text) {
   return quoted + '"';
 }
 
-std::string toml(bool value) {
-  return value ? "true" : "false";
-}
+std::string toml(bool value) { return value ? "true" : "false"; }
 
 std::string toml(double value) {
   std::string text = shortest(value);
@@ -85,13 +83,9 @@ std::string toml(double value) {
   return text;
 }
 
-std::string toml(const Eigen::Isometry3d& pose) {
-  return "[" + pose_text(pose) + "]";
-}
+std::string toml(const Eigen::Isometry3d& pose) { return "[" + pose_text(pose) + "]"; }
 
-std::string toml(const std::optional<int>& value) {
-  return std::to_string(value.value_or(0));
-}
+std::string toml(const std::optional<int>& value) { return std::to_string(value.value_or(0)); }
 
 std::string toml(const std::optional<Eigen::Isometry3d>& pose) {
   return toml(pose.value_or(Eigen::Isometry3d::Identity()));

@@ -69,9 +69,7 @@ double height_over_longest_side(std::span<const PointPair> pairs, Vec3 PointPair
   return height;
 }
 
-std::string millimetres(double metres) {
-  return shortest(std::round(1e4 * metres) / 10.0) + " mm";
-}
+std::string millimetres(double metres) { return shortest(std::round(1e4 * metres) / 10.0) + " mm"; }
 
 void check_spread(std::span<const PointPair> pairs, const FitOptions& options) {
   for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -187,9 +187,7 @@ Session::Session(SessionOptions options) : options_(std::move(options)) {
   if (!options_.record.empty()) open_recorder(options_.record, false);
 }
 
-Session::~Session() {
-  stop();
-}
+Session::~Session() { stop(); }
 
 void Session::start() {
   refuse_if_stopped();

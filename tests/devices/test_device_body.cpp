@@ -31,9 +31,7 @@ using test::fails_saying;
 
 constexpr double ms = 1e-3;
 
-HipPath resting_at(const Vec3& place) {
-  return HipPath({{0.0, place}});
-}
+HipPath resting_at(const Vec3& place) { return HipPath({{0.0, place}}); }
 
 // A device that nobody holds.
 HandModel alone(const DeviceBody& body) {

@@ -49,9 +49,7 @@ TEST(ScriptedDevice, RepeatsItsPathIfToldTo) {
   EXPECT_EQ(still.read(7.0).position, Vec3(1, 2, 3));
 }
 
-HipPath resting_at(const Vec3& place) {
-  return HipPath({{0.0, place}});
-}
+HipPath resting_at(const Vec3& place) { return HipPath({{0.0, place}}); }
 
 constexpr HandModel still_hand{.tremor = 0.0};
 

@@ -99,9 +99,7 @@ class Dds : public ::testing::Test {
   test::OwnNetwork network_;
 };
 
-ros::Header header(const char* frame) {
-  return {{17, 250'000'001}, frame};
-}
+ros::Header header(const char* frame) { return {{17, 250'000'001}, frame}; }
 
 std::vector<std::byte> bytes(std::size_t count) {
   std::vector<std::byte> all(count);

@@ -49,9 +49,7 @@ Arm* arm_of(char id) {
   return &arms[i];
 }
 
-int count() {
-  return workbench().plugged_in ? workbench().devices.load() : 0;
-}
+int count() { return workbench().plugged_in ? workbench().devices.load() : 0; }
 
 // What the firmware does by itself.
 void let_firmware_act(Arm& arm) {
@@ -84,9 +82,7 @@ EXPORT int dhdOpenID(char index) {
   ++workbench().opens;
   return index;
 }
-EXPORT int dhdOpen() {
-  return dhdOpenID(0);
-}
+EXPORT int dhdOpen() { return dhdOpenID(0); }
 EXPORT int dhdOpenSerial(int serial) {
   return serial < 10517 ? fail("no device found") : dhdOpenID(static_cast<char>(serial - 10517));
 }
@@ -121,9 +117,7 @@ EXPORT void dhdGetSDKVersion(int* major, int* minor, int* release, int* revision
   *release = 5;
   *revision = 0;
 }
-EXPORT const char* dhdErrorGetLastStr() {
-  return last_error;
-}
+EXPORT const char* dhdErrorGetLastStr() { return last_error; }
 EXPORT int dhdGetPosition(double* x, double* y, double* z, char id) {
   Arm* arm = arm_of(id);
   if (arm == nullptr) return -1;
@@ -177,18 +171,10 @@ EXPORT int dhdEnableForce(unsigned char on, char id) {
   arm->cause = on != 0 ? none : software;
   return 0;
 }
-EXPORT int dhdSetBrakes(int /*on*/, char id) {
-  return arm_of(id) == nullptr ? -1 : 0;
-}
-EXPORT int dhdSetGravityCompensation(int /*on*/, char id) {
-  return arm_of(id) == nullptr ? -1 : 0;
-}
-EXPORT int dhdSetMaxForce(double /*newtons*/, char id) {
-  return arm_of(id) == nullptr ? -1 : 0;
-}
-EXPORT unsigned dhdGetButtonMask(char id) {
-  return arm_of(id) == nullptr ? 0U : 1U;
-}
+EXPORT int dhdSetBrakes(int /*on*/, char id) { return arm_of(id) == nullptr ? -1 : 0; }
+EXPORT int dhdSetGravityCompensation(int /*on*/, char id) { return arm_of(id) == nullptr ? -1 : 0; }
+EXPORT int dhdSetMaxForce(double /*newtons*/, char id) { return arm_of(id) == nullptr ? -1 : 0; }
+EXPORT unsigned dhdGetButtonMask(char id) { return arm_of(id) == nullptr ? 0U : 1U; }
 EXPORT int dhdEmulateButton(unsigned char /*on*/, char id) {
   return arm_of(id) == nullptr ? -1 : 0;
 }
@@ -203,15 +189,11 @@ EXPORT int dhdGetStatus(int* status, char id) {
   status[14] = arm->cause;
   return 0;
 }
-EXPORT bool dhdHasWrist(char id) {
-  return arm_of(id) == nullptr || workbench().active_wrist;
-}
+EXPORT bool dhdHasWrist(char id) { return arm_of(id) == nullptr || workbench().active_wrist; }
 EXPORT bool dhdHasActiveWrist(char id) {
   return arm_of(id) != nullptr && workbench().active_wrist && !workbench().wrist_is_off;
 }
-EXPORT bool dhdHasGripper(char /*id*/) {
-  return false;
-}
+EXPORT bool dhdHasGripper(char /*id*/) { return false; }
 EXPORT int dhdEnableExpertMode() {
   for (Arm& arm : arms) arm.expert = true;
   return 0;
@@ -229,9 +211,7 @@ EXPORT int dhdSetWatchdog(unsigned char units, char id) {
 EXPORT int drdOpenID(char index) {
   return arm_of(index) == nullptr ? -1 : index;  // one that is open: its own
 }
-EXPORT bool drdIsInitialized(char id) {
-  return arm_of(id) != nullptr && workbench().calibrated;
-}
+EXPORT bool drdIsInitialized(char id) { return arm_of(id) != nullptr && workbench().calibrated; }
 EXPORT int drdAutoInit(char id) {
   if (arm_of(id) == nullptr) return -1;
   ++workbench().calibrations;

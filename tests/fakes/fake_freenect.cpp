@@ -15,9 +15,7 @@ namespace {
 
 int live_objects = 0;  // made and not given back
 
-FakeCamera& world() {
-  return FakeCamera::instance();
-}
+FakeCamera& world() { return FakeCamera::instance(); }
 
 }  // namespace
 
@@ -49,9 +47,7 @@ struct Kinect {
   int generation;
 };
 
-FAKE_EXPORT int fake_live_objects() {
-  return live_objects;
-}
+FAKE_EXPORT int fake_live_objects() { return live_objects; }
 
 FAKE_EXPORT int freenect_init(Context** context, void* /*usb*/) {
   world().begin();
@@ -83,9 +79,7 @@ FAKE_EXPORT void freenect_free_device_attributes(Attributes* list) {
     --live_objects;
   }
 }
-FAKE_EXPORT int freenect_num_devices(Context* /*context*/) {
-  return world().cameras();
-}
+FAKE_EXPORT int freenect_num_devices(Context* /*context*/) { return world().cameras(); }
 FAKE_EXPORT int freenect_open_device(Context* context, Kinect** kinect, int /*index*/) {
   if (world().has("denied") || world().is_gone()) return -1;
   *kinect = new Kinect{context, {}, nullptr, world().generation()};

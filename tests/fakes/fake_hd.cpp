@@ -188,12 +188,8 @@ EXPORT unsigned long hdScheduleAsynchronous(Callback function, void* data, unsig
   callback_data = data;
   return 1;
 }
-EXPORT void hdUnschedule(unsigned long) {
-  callback = nullptr;
-}
-EXPORT void hdSetSchedulerRate(unsigned long hertz) {
-  rate = static_cast<double>(hertz);
-}
+EXPORT void hdUnschedule(unsigned long) { callback = nullptr; }
+EXPORT void hdSetSchedulerRate(unsigned long hertz) { rate = static_cast<double>(hertz); }
 EXPORT void hdStartScheduler() {
   running = true;
   scheduler = std::thread(run_scheduler);
@@ -207,6 +203,4 @@ EXPORT unsigned hdCheckCalibration() {
   if (!in_frame) raise(0x102);
   return workbench().calibrated ? 0x5000 : 0x5002;
 }
-EXPORT void hdUpdateCalibration(unsigned) {
-  ++workbench().calibrations;
-}
+EXPORT void hdUpdateCalibration(unsigned) { ++workbench().calibrations; }

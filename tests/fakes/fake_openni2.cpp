@@ -12,9 +12,7 @@ namespace {
 
 int live_objects = 0;  // made and not given back
 
-FakeCamera& world() {
-  return FakeCamera::instance();
-}
+FakeCamera& world() { return FakeCamera::instance(); }
 
 std::string last_error;
 
@@ -82,9 +80,7 @@ bool is_gone(const Stream* stream) {
 
 }  // namespace
 
-FAKE_EXPORT int fake_live_objects() {
-  return live_objects;
-}
+FAKE_EXPORT int fake_live_objects() { return live_objects; }
 
 FAKE_EXPORT int oniInitialize(int version) {
   world().begin();
@@ -95,15 +91,9 @@ FAKE_EXPORT int oniInitialize(int version) {
   ++live_objects;
   return 0;
 }
-FAKE_EXPORT void oniShutdown() {
-  --live_objects;
-}
-FAKE_EXPORT Version oniGetVersion() {
-  return {2, 2, 0, 33};
-}
-FAKE_EXPORT const char* oniGetExtendedError() {
-  return last_error.c_str();
-}
+FAKE_EXPORT void oniShutdown() { --live_objects; }
+FAKE_EXPORT Version oniGetVersion() { return {2, 2, 0, 33}; }
+FAKE_EXPORT const char* oniGetExtendedError() { return last_error.c_str(); }
 FAKE_EXPORT int oniGetDeviceList(DeviceInfo** list, int* count) {
   world().look();
   *count = world().cameras();
@@ -185,9 +175,7 @@ FAKE_EXPORT int oniStreamStart(Stream* stream) {
   stream->is_running = true;
   return 0;
 }
-FAKE_EXPORT void oniStreamStop(Stream* stream) {
-  stream->is_running = false;
-}
+FAKE_EXPORT void oniStreamStop(Stream* stream) { stream->is_running = false; }
 FAKE_EXPORT int oniStreamGetProperty(Stream* stream, int property, void* data, int* size) {
   if (property == 3 && *size == static_cast<int>(sizeof(VideoMode))) {
     std::memcpy(data, &stream->mode, sizeof(VideoMode));

@@ -78,18 +78,14 @@ struct rs2_extrinsics {
 
 namespace {
 
-FakeCamera& world() {
-  return FakeCamera::instance();
-}
+FakeCamera& world() { return FakeCamera::instance(); }
 
 void fail(rs2_error** error, const std::string& message) {
   *error = new rs2_error;
   (*error)->message = message;
 }
 
-std::string serial_of(int index) {
-  return "10000000000" + std::to_string(index + 1);
-}
+std::string serial_of(int index) { return "10000000000" + std::to_string(index + 1); }
 
 rs2_stream_profile depth_profile{1, 1, 30, 0, 0};
 rs2_stream_profile colour_profile{2, 5, 30, 0, 0};
@@ -127,12 +123,8 @@ rs2_frame* colour_frame() {
 
 }  // namespace
 
-FAKE_EXPORT int fake_live_objects() {
-  return live_objects;
-}
-FAKE_EXPORT float fake_option(int option) {
-  return options.at(static_cast<std::size_t>(option));
-}
+FAKE_EXPORT int fake_live_objects() { return live_objects; }
+FAKE_EXPORT float fake_option(int option) { return options.at(static_cast<std::size_t>(option)); }
 
 FAKE_EXPORT int rs2_get_api_version(rs2_error** /*error*/) {
   world().begin();
@@ -141,9 +133,7 @@ FAKE_EXPORT int rs2_get_api_version(rs2_error** /*error*/) {
 FAKE_EXPORT const char* rs2_get_error_message(const rs2_error* error) {
   return error->message.c_str();
 }
-FAKE_EXPORT void rs2_free_error(rs2_error* error) {
-  delete error;
-}
+FAKE_EXPORT void rs2_free_error(rs2_error* error) { delete error; }
 
 FAKE_EXPORT rs2_context* rs2_create_context(int version, rs2_error** error) {
   if (version > 25802) {
@@ -152,9 +142,7 @@ FAKE_EXPORT rs2_context* rs2_create_context(int version, rs2_error** error) {
   }
   return new rs2_context;
 }
-FAKE_EXPORT void rs2_delete_context(rs2_context* context) {
-  delete context;
-}
+FAKE_EXPORT void rs2_delete_context(rs2_context* context) { delete context; }
 FAKE_EXPORT rs2_device_list* rs2_query_devices(const rs2_context* /*context*/,
                                                rs2_error** /*error*/) {
   world().look();
@@ -169,9 +157,7 @@ FAKE_EXPORT int rs2_device_list_contains(const rs2_device_list* list, const rs2_
                                          rs2_error** /*error*/) {
   return static_cast<int>(list->count > 0 && device->generation == world().generation());
 }
-FAKE_EXPORT void rs2_delete_device_list(rs2_device_list* list) {
-  delete list;
-}
+FAKE_EXPORT void rs2_delete_device_list(rs2_device_list* list) { delete list; }
 FAKE_EXPORT rs2_device* rs2_create_device(const rs2_device_list* list, int index,
                                           rs2_error** error) {
   if (index < 0 || index >= list->count) {
@@ -187,9 +173,7 @@ FAKE_EXPORT rs2_device* rs2_create_device(const rs2_device_list* list, int index
   device->generation = world().generation();
   return device;
 }
-FAKE_EXPORT void rs2_delete_device(rs2_device* device) {
-  delete device;
-}
+FAKE_EXPORT void rs2_delete_device(rs2_device* device) { delete device; }
 FAKE_EXPORT int rs2_supports_device_info(const rs2_device* /*device*/, int info,
                                          rs2_error** /*error*/) {
   return info >= 0 && info <= 2 ? 1 : static_cast<int>(info == 9);
@@ -222,18 +206,14 @@ FAKE_EXPORT rs2_sensor_list* rs2_query_sensors(const rs2_device* /*device*/,
 FAKE_EXPORT int rs2_get_sensors_count(const rs2_sensor_list* /*list*/, rs2_error** /*error*/) {
   return 2;
 }
-FAKE_EXPORT void rs2_delete_sensor_list(rs2_sensor_list* list) {
-  delete list;
-}
+FAKE_EXPORT void rs2_delete_sensor_list(rs2_sensor_list* list) { delete list; }
 FAKE_EXPORT rs2_sensor* rs2_create_sensor(const rs2_sensor_list* /*list*/, int index,
                                           rs2_error** /*error*/) {
   auto* sensor = new rs2_sensor;
   sensor->is_depth = index == 1;
   return sensor;
 }
-FAKE_EXPORT void rs2_delete_sensor(rs2_sensor* sensor) {
-  delete sensor;
-}
+FAKE_EXPORT void rs2_delete_sensor(rs2_sensor* sensor) { delete sensor; }
 FAKE_EXPORT int rs2_is_sensor_extendable_to(const rs2_sensor* sensor, int extension,
                                             rs2_error** /*error*/) {
   return static_cast<int>(sensor->is_depth && extension == 7);
@@ -257,12 +237,8 @@ FAKE_EXPORT void rs2_set_option(const rs2_sensor* /*sensor*/, int option, float 
   options.at(static_cast<std::size_t>(option)) = value;
 }
 
-FAKE_EXPORT rs2_config* rs2_create_config(rs2_error** /*error*/) {
-  return new rs2_config;
-}
-FAKE_EXPORT void rs2_delete_config(rs2_config* config) {
-  delete config;
-}
+FAKE_EXPORT rs2_config* rs2_create_config(rs2_error** /*error*/) { return new rs2_config; }
+FAKE_EXPORT void rs2_delete_config(rs2_config* config) { delete config; }
 FAKE_EXPORT void rs2_config_enable_device(rs2_config* config, const char* serial,
                                           rs2_error** /*error*/) {
   config->serial = serial;
@@ -281,9 +257,7 @@ FAKE_EXPORT void rs2_config_enable_stream(rs2_config* config, int stream, int /*
 FAKE_EXPORT rs2_pipeline* rs2_create_pipeline(rs2_context* /*context*/, rs2_error** /*error*/) {
   return new rs2_pipeline;
 }
-FAKE_EXPORT void rs2_delete_pipeline(rs2_pipeline* pipeline) {
-  delete pipeline;
-}
+FAKE_EXPORT void rs2_delete_pipeline(rs2_pipeline* pipeline) { delete pipeline; }
 FAKE_EXPORT rs2_pipeline_profile* rs2_pipeline_start_with_config(rs2_pipeline* pipeline,
                                                                  rs2_config* config,
                                                                  rs2_error** error) {
@@ -322,9 +296,7 @@ FAKE_EXPORT rs2_device* rs2_pipeline_profile_get_device(rs2_pipeline_profile* pr
   device->generation = profile->generation;
   return device;
 }
-FAKE_EXPORT void rs2_delete_pipeline_profile(rs2_pipeline_profile* profile) {
-  delete profile;
-}
+FAKE_EXPORT void rs2_delete_pipeline_profile(rs2_pipeline_profile* profile) { delete profile; }
 FAKE_EXPORT int rs2_pipeline_try_wait_for_frames(rs2_pipeline* pipeline, rs2_frame** frame,
                                                  unsigned milliseconds, rs2_error** error) {
   if (!pipeline->is_running) {

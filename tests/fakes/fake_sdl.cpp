@@ -18,25 +18,19 @@ int pad = 0;
 
 #define EXPORT extern "C" __attribute__((visibility("default")))
 
-EXPORT int SDL_SetHint(const char*, const char*) {
-  return 1;
-}
+EXPORT int SDL_SetHint(const char*, const char*) { return 1; }
 EXPORT int SDL_InitSubSystem(std::uint32_t flags) {
   find_workbench();
   return flags == 0x2000 ? 0 : -1;
 }
 EXPORT void SDL_QuitSubSystem(std::uint32_t) {}
-EXPORT const char* SDL_GetError() {
-  return "";
-}
+EXPORT const char* SDL_GetError() { return ""; }
 EXPORT void SDL_GetVersion(std::uint8_t* version) {
   version[0] = 2;
   version[1] = 26;
   version[2] = 5;
 }
-EXPORT int SDL_NumJoysticks() {
-  return workbench().plugged_in ? 2 : 0;
-}
+EXPORT int SDL_NumJoysticks() { return workbench().plugged_in ? 2 : 0; }
 EXPORT int SDL_IsGameController(int index) {
   return index == 1 ? 1 : 0;  // the first is a joystick without a layout
 }
@@ -45,26 +39,18 @@ EXPORT void* SDL_GameControllerOpen(int index) {
   ++workbench().opens;
   return &pad;
 }
-EXPORT void SDL_GameControllerClose(void*) {
-  ++workbench().closes;
-}
-EXPORT const char* SDL_GameControllerName(void*) {
-  return "Fake Controller";
-}
+EXPORT void SDL_GameControllerClose(void*) { ++workbench().closes; }
+EXPORT const char* SDL_GameControllerName(void*) { return "Fake Controller"; }
 EXPORT void SDL_GameControllerUpdate() {
   if (workbench().began == 0.0) workbench().began = clock_now();
 }
-EXPORT int SDL_GameControllerGetAttached(void*) {
-  return workbench().plugged_in ? 1 : 0;
-}
+EXPORT int SDL_GameControllerGetAttached(void*) { return workbench().plugged_in ? 1 : 0; }
 EXPORT std::int16_t SDL_GameControllerGetAxis(void*, int axis) {
   if (axis != 3) return 0;
   const double t = clock_now() - workbench().began;
   return std::fmod(t, 1.5) < 1.0 ? 32767 : -32768;  // a second down and half a second up
 }
-EXPORT std::uint8_t SDL_GameControllerGetButton(void*, int button) {
-  return button == 2 ? 1 : 0;
-}
+EXPORT std::uint8_t SDL_GameControllerGetButton(void*, int button) { return button == 2 ? 1 : 0; }
 EXPORT int SDL_GameControllerRumble(void*, std::uint16_t slow, std::uint16_t quick, std::uint32_t) {
   workbench().force_on = true;
   workbench().command(slow, quick, 0.0, clock_now());

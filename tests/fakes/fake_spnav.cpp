@@ -44,9 +44,7 @@ EXPORT int spnav_close() {
   ++workbench().closes;
   return 0;
 }
-EXPORT int spnav_fd() {
-  return timer;
-}
+EXPORT int spnav_fd() { return timer; }
 EXPORT int spnav_poll_event(void* event) {
   std::uint64_t times = 0;
   if (!workbench().plugged_in || read(timer, &times, sizeof times) < 0) return 0;

@@ -33,9 +33,7 @@ struct Node {
 };
 Node node;
 
-FakeCamera& world() {
-  return FakeCamera::instance();
-}
+FakeCamera& world() { return FakeCamera::instance(); }
 
 template <class Function>
 Function* real(const char* name) {
@@ -47,13 +45,9 @@ int refuse(int error) {
   return -1;
 }
 
-int stride() {
-  return 2 * world().width() + 16;
-}
+int stride() { return 2 * world().width() + 16; }
 
-bool is_gone() {
-  return world().is_gone() || node.generation != world().generation();
-}
+bool is_gone() { return world().is_gone() || node.generation != world().generation(); }
 
 void fill(unsigned index) {
   auto& bytes = node.memory.at(index);

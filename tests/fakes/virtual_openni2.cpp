@@ -14,9 +14,7 @@
 
 namespace {
 
-FakeCamera& world() {
-  return FakeCamera::instance();
-}
+FakeCamera& world() { return FakeCamera::instance(); }
 
 template <class Value>
 OniStatus give(const Value& value, void* data, int* size) {

@@ -101,9 +101,7 @@ inline Workbench unwatched_workbench;
 inline Workbench* current_workbench = &unwatched_workbench;
 
 /// The workbench of a fake.
-inline Workbench& workbench() {
-  return *current_workbench;
-}
+inline Workbench& workbench() { return *current_workbench; }
 /// Finds the one that the environment names, when a fake's device is opened.
 inline void find_workbench() {
   if (const char* file = std::getenv(Workbench::variable))

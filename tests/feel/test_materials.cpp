@@ -56,9 +56,7 @@ std::unique_ptr<Feel> around_flat(const Parameters& parameters) {
 }
 
 // The HIP of a hand that is pressed in by `depth` [m] at `x`, `y`.
-Vec3 pressed(double depth, double x = 0.0, double y = 0.0) {
-  return {x, y, -depth};
-}
+Vec3 pressed(double depth, double x = 0.0, double y = 0.0) { return {x, y, -depth}; }
 
 // A wall of pixels at z = 0 seen from 0.4 m above, 0.5 mm apart, whose pixels are labelled by the
 // place that they see.

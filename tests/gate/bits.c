@@ -24,9 +24,7 @@ static Channel any_channel(void) {
   return c;
 }
 
-static int is_zero(Vector v) {
-  return v.x == 0.0 && v.y == 0.0 && v.z == 0.0;
-}
+static int is_zero(Vector v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 static int is_good_channel(Channel c) {
   return is_sound(c.last) && between(c.size, 0.0, 2.0 * LARGEST_LIMIT) &&
          between(c.ring, 0.0, MOST_RING) && between(c.rest, 0.0, LARGEST_REST) &&
@@ -46,18 +44,10 @@ double same_dot(Vector a, Vector b) {
 double same_changed(Vector v, double kept, Vector last) {
   return __CPROVER_uninterpreted_changed(v.x, v.y, v.z, kept, last.x, last.y, last.z);
 }
-double same_widen(double bound) {
-  return __CPROVER_uninterpreted_product(bound, WIDEN);
-}
-Vector any_scaled(double k, Vector v) {
-  return any_vector();
-}
-double any_ratio(double a, double b) {
-  return nondet_double();
-}
-double any_bound(Channel c, Bounds b, Tick t) {
-  return nondet_double();
-}
+double same_widen(double bound) { return __CPROVER_uninterpreted_product(bound, WIDEN); }
+Vector any_scaled(double k, Vector v) { return any_vector(); }
+double any_ratio(double a, double b) { return nondet_double(); }
+double any_bound(Channel c, Bounds b, Tick t) { return nondet_double(); }
 int same_within(Vector v, double bound) {
   return is_sound(v) && __CPROVER_uninterpreted_dot(v.x, v.y, v.z, v.x, v.y, v.z) <=
                             __CPROVER_uninterpreted_product(bound, bound);
@@ -68,12 +58,8 @@ Guess any_guess(Channel c, int late, double top, double turn, Vector wish) {
   const Guess g = {nondet_double(), nondet_double()};
   return g;
 }
-double any_share(double bound, Vector v) {
-  return nondet_double();
-}
-double any_root(double x) {
-  return nondet_double();
-}
+double any_share(double bound, Vector v) { return nondet_double(); }
+double any_root(double x) { return nondet_double(); }
 double any_step(Bounds b, Tick t) {
   const double step = nondet_double();
   ASSUME(step >= 0.0); /* check_step */

@@ -34,9 +34,7 @@ std::string text_of(const fs::path& file) {
   return text.str();
 }
 
-void write(const fs::path& file, const std::string& text) {
-  std::ofstream(file) << text;
-}
+void write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at))

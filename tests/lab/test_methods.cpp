@@ -50,9 +50,7 @@ Tick press(Method& method, const Cloud& cloud, const Vec3& to) {
 }
 
 // Where it was held back, as the method has it: on the surface, not r_c above it.
-Vec3 contact(const Tick& tick) {
-  return tick.proxy - r_c * tick.normal;
-}
+Vec3 contact(const Tick& tick) { return tick.proxy - r_c * tick.normal; }
 
 // The middle of an image that a camera a metre above takes of a height field.
 template <class Height>
@@ -63,9 +61,7 @@ PointCloud seen(const Height& height) {
   return PointCloud(std::move(surface), camera);
 }
 
-double flat(double /*x*/, double /*y*/) {
-  return 0.0;
-}
+double flat(double /*x*/, double /*y*/) { return 0.0; }
 
 class EveryMethod : public ::testing::TestWithParam<std::string> {};
 

@@ -27,9 +27,7 @@ using test::record_press;
 using test::TemporaryFolder;
 using test::wavy_floor;
 
-std::uint64_t bits(double value) {
-  return std::bit_cast<std::uint64_t>(value);
-}
+std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
 
 TEST(RecordedHand, IsThatOfEvenlySpacedTicks) {
   const TemporaryFolder folder;

@@ -95,9 +95,7 @@ struct Recording {
   std::size_t least_places;  // that have to be found: the scene is known to be dense there
 };
 
-void PrintTo(const Recording& recording, std::ostream* out) {
-  *out << recording.path;
-}
+void PrintTo(const Recording& recording, std::ostream* out) { *out << recording.path; }
 
 class Touching : public ::testing::TestWithParam<Recording> {};
 

@@ -20,9 +20,7 @@ struct Seen {
   }
 };
 
-Seen seen(const std::string& uri) {
-  return {*open_synthetic_camera(Uri(uri))->next()};
-}
+Seen seen(const std::string& uri) { return {*open_synthetic_camera(Uri(uri))->next()}; }
 
 // A pose off by some centimetres and degrees, about another axis for each number.
 Eigen::Isometry3d off(double metres, double radians, int number) {

@@ -171,9 +171,7 @@ class FaultyCamera {
   int number_ = 0;
 };
 
-bool is_odd(double t) {
-  return static_cast<int>(std::floor(t / 0.02)) % 2 != 0;
-}
+bool is_odd(double t) { return static_cast<int>(std::floor(t / 0.02)) % 2 != 0; }
 
 constexpr double max_torque = 0.1;  // [N m]
 

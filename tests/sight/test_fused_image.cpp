@@ -63,9 +63,7 @@ class Camera {
   std::vector<std::unique_ptr<DepthImage>> images_;
 };
 
-double valley(double x, double /*y*/) {
-  return std::abs(x);
-}
+double valley(double x, double /*y*/) { return std::abs(x); }
 
 // The root mean square of what a fused image's points about a place are above a surface.
 double error(const FusedImage& fused, const Camera::Height& height, const Vec3& place) {

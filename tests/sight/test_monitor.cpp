@@ -25,9 +25,7 @@ constexpr double interval = 1.0 / 30.0;
 constexpr double r_c = 5e-3;
 const Vec3 eye(0, 0, 1);
 
-PointCloud plane_at(double z) {
-  return PointCloud(test::flat_grid(z, 1.5e-3, 40), eye);
-}
+PointCloud plane_at(double z) { return PointCloud(test::flat_grid(z, 1.5e-3, 40), eye); }
 
 // A contact pressed into a plane at z = 0 from above.
 Monitor::Contact pressed(double hip_z, double proxy_z) {

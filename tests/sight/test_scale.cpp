@@ -66,9 +66,7 @@ std::vector<Tick> play(const Scene& scene, const Scale& scale) {
   return felt;
 }
 
-double between(double x, double from, double to) {
-  return std::min(std::max(x, from), to);
-}
+double between(double x, double from, double to) { return std::min(std::max(x, from), to); }
 
 std::vector<Scene> scenes() {
   const auto presses = [](double x, double depth) {

@@ -20,9 +20,7 @@ std::vector<std::byte> bytes_of(std::initializer_list<int> values) {
   return bytes;
 }
 
-DepthPng parse(const std::vector<std::byte>& bytes) {
-  return parse_depth_rvl(bytes, "a message");
-}
+DepthPng parse(const std::vector<std::byte>& bytes) { return parse_depth_rvl(bytes, "a message"); }
 
 // By hand, as the code's paper has it: two zeros (2), two values (2), +5 (10 is A, 1), +1 (2), a
 // zero (1), a value (1), +1 (2).

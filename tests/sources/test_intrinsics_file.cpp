@@ -25,9 +25,7 @@ json complete() {
           {"depth_units_per_metre", 5000}};
 }
 
-RecordedCamera parse(const json& object) {
-  return parse_intrinsics(object.dump(), "k.json");
-}
+RecordedCamera parse(const json& object) { return parse_intrinsics(object.dump(), "k.json"); }
 
 json with(const char* key, const json& value) {
   json object = complete();

@@ -48,9 +48,7 @@ std::string voxels(const std::function<double(const Vec3&)>& value,
   }
   return bytes;
 }
-double to_ball(const Vec3& at) {
-  return (at - middle).norm() - radius;
-}
+double to_ball(const Vec3& at) { return (at - middle).norm() - radius; }
 std::string header(const std::string& type, const std::string& more = "encoding: raw\n") {
   return "NRRD0005\n# made by a test\ntype: " + type +
          "\ndimension: 3\nspace: left-posterior-superior\nsizes: 24 24 24\n"
@@ -61,9 +59,7 @@ std::string header(const std::string& type, const std::string& more = "encoding:
 PointFile nrrd(const std::string& bytes, double level = 0.0) {
   return parse_nrrd(std::as_bytes(std::span(bytes)), "test.nrrd", "/nowhere", level);
 }
-std::string ball() {
-  return header("float") + "\n" + voxels<float>(to_ball);
-}
+std::string ball() { return header("float") + "\n" + voxels<float>(to_ball); }
 
 TEST(Nrrd, ABallIsClosedAndWhereItIs) {
   const PointFile mesh = nrrd(ball());

@@ -20,9 +20,7 @@ namespace test_pcd {
 using test::bytes_of;
 using test::fails_saying;
 
-PointFile parse(std::string_view text) {
-  return test::parse(parse_pcd, text);
-}
+PointFile parse(std::string_view text) { return test::parse(parse_pcd, text); }
 
 constexpr std::array<const char*, 3> encodings{"ascii", "binary", "binary_compressed"};
 

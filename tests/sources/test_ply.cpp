@@ -15,9 +15,7 @@ namespace test_ply {
 using test::bytes_of;
 using test::fails_saying;
 
-PointFile parse(std::string_view text) {
-  return test::parse(parse_ply, text);
-}
+PointFile parse(std::string_view text) { return test::parse(parse_ply, text); }
 
 constexpr std::array<const char*, 3> encodings{"ascii", "binary_little_endian",
                                                "binary_big_endian"};

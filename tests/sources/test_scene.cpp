@@ -18,9 +18,7 @@ using test::fails_saying;
 
 constexpr double pi = std::numbers::pi;
 
-Scene scene(const std::string& text) {
-  return make_scene(Uri("synthetic:" + text));
-}
+Scene scene(const std::string& text) { return make_scene(Uri("synthetic:" + text)); }
 
 // Height of the scene over (x, y), seen from straight above.
 double height(const Scene& scene, double x, double y, double t = 0.0) {

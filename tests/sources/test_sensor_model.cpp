@@ -27,9 +27,7 @@ constexpr std::size_t pixels = static_cast<std::size_t>(width) * height;
 
 using Readings = std::vector<std::uint16_t>;
 
-Intrinsics camera() {
-  return pinhole(width, height, 1.0);
-}
+Intrinsics camera() { return pinhole(width, height, 1.0); }
 
 std::vector<float> wall(float depth) {
   std::vector<float> depths(pixels, depth);

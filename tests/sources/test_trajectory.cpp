@@ -13,9 +13,7 @@ namespace test_trajectory {
 
 using test::fails_saying;
 
-Trajectory parse(const std::string& text) {
-  return parse_trajectory(text, "path.txt");
-}
+Trajectory parse(const std::string& text) { return parse_trajectory(text, "path.txt"); }
 
 TEST(Trajectory, GivesThePosesOfItsLines) {
   // A quarter turn about z: the camera's x axis lies along the world's y.

@@ -52,12 +52,8 @@ void* operator new(std::size_t size) {
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return palpate::test::counted_allocation(size, static_cast<std::size_t>(alignment));
 }
-void operator delete(void* memory) noexcept {
-  palpate::test::counted_release(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  palpate::test::counted_release(memory);
-}
+void operator delete(void* memory) noexcept { palpate::test::counted_release(memory); }
+void operator delete(void* memory, std::size_t) noexcept { palpate::test::counted_release(memory); }
 void operator delete(void* memory, std::align_val_t) noexcept {
   palpate::test::counted_release(memory);
 }

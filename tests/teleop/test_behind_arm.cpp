@@ -55,9 +55,7 @@ TEST_F(BehindArmTest, ShowsWhatWasSeenThere) {
   for (int i = 0; i < 30; ++i) EXPECT_EQ(fill(true, slope), before);
 }
 
-TEST_F(BehindArmTest, IsAHoleWhereNothingWasSeen) {
-  EXPECT_EQ(shown(fill(true, slope)), 0);
-}
+TEST_F(BehindArmTest, IsAHoleWhereNothingWasSeen) { EXPECT_EQ(shown(fill(true, slope)), 0); }
 
 TEST_F(BehindArmTest, ForgetsInTime) {
   fill(false, slope);

@@ -26,13 +26,9 @@ namespace {
 constexpr double stiffness = 600.0;  // [N/m]
 constexpr double frame_time = 1.0 / 30.0;
 
-std::shared_ptr<const ToolShape> tool(const std::string& text) {
-  return make_tool(text, {});
-}
+std::shared_ptr<const ToolShape> tool(const std::string& text) { return make_tool(text, {}); }
 
-HandPose pose(const Vec3& at, const Vec3& turn = Vec3::Zero()) {
-  return {at, rotation_by(turn)};
-}
+HandPose pose(const Vec3& at, const Vec3& turn = Vec3::Zero()) { return {at, rotation_by(turn)}; }
 
 // A tool before a synthetic camera, tick by tick.
 class Stage {
@@ -101,9 +97,7 @@ Part part(Shape shape) {
   return part;
 }
 
-Scene plane() {
-  return Scene({part(HalfSpace{})});
-}
+Scene plane() { return Scene({part(HalfSpace{})}); }
 
 // What a spring pulls and turns that holds a tool with one point `lever` from the hand at a plane:
 // the least energy of both springs (docs/tools.md, (2)).

@@ -12,9 +12,7 @@
 namespace palpate {
 namespace {
 
-std::shared_ptr<const ToolShape> made(const std::string& text) {
-  return make_tool(text, {});
-}
+std::shared_ptr<const ToolShape> made(const std::string& text) { return make_tool(text, {}); }
 
 std::string refusal(const std::string& text) {
   try {
@@ -74,9 +72,7 @@ TEST(ToolShape, HasItsNormalsInwards) {
   }
 }
 
-TEST(ToolShape, GivesABallToOtherMethods) {
-  EXPECT_EQ(made("ball"), nullptr);
-}
+TEST(ToolShape, GivesABallToOtherMethods) { EXPECT_EQ(made("ball"), nullptr); }
 
 TEST(ToolShape, SaysWhatIsWrong) {
   EXPECT_NE(refusal("box:40x20mm").find("needs 3"), std::string::npos);

@@ -121,9 +121,7 @@ class ViewerServerTest : public ::testing::Test {
 };
 
 // What a page has to know after `token=` in the address that the server gives.
-std::string target_of(const std::string& url) {
-  return "/session" + url.substr(url.find('?'));
-}
+std::string target_of(const std::string& url) { return "/session" + url.substr(url.find('?')); }
 
 ViewerMessage frame(std::uint32_t number, std::uint8_t camera = 0) {
   const auto depth =

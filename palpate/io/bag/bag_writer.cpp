@@ -94,9 +94,7 @@ BagWriter::File::File(fs::path where)
                 "check its folder's permissions, and that there is room on the disk");
 }
 
-BagWriter::File::~File() {
-  ::close(descriptor);
-}
+BagWriter::File::~File() { ::close(descriptor); }
 
 void BagWriter::Times::add(std::int64_t nanoseconds) {
   first = std::min(first, nanoseconds);

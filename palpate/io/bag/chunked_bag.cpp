@@ -13,13 +13,9 @@ namespace palpate {
 
 static_assert(std::endian::native == std::endian::little, "records are read as they lie in RAM");
 
-std::string BytePlace::text() const {
-  return file.string() + ": byte " + std::to_string(byte);
-}
+std::string BytePlace::text() const { return file.string() + ": byte " + std::to_string(byte); }
 
-void BytePlace::fail(const std::string& why) const {
-  throw Error(text(), why, remedy);
-}
+void BytePlace::fail(const std::string& why) const { throw Error(text(), why, remedy); }
 
 RandomAccess::RandomAccess(const std::filesystem::path& path) : path_(path) {
   std::error_code error;
@@ -33,9 +29,7 @@ RandomAccess::RandomAccess(const std::filesystem::path& path) : path_(path) {
   size_ = end < 0 ? 0 : static_cast<std::uint64_t>(end);
 }
 
-RandomAccess::~RandomAccess() {
-  ::close(descriptor_);
-}
+RandomAccess::~RandomAccess() { ::close(descriptor_); }
 
 void RandomAccess::read(std::uint64_t at, std::span<std::byte> into) const {
   while (!into.empty()) {

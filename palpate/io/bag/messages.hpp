@@ -291,9 +291,7 @@ std::string definition_of(std::string_view type);
 namespace palpate {
 
 /// As messages have a vector.
-inline std::array<double, 3> components(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
+inline std::array<double, 3> components(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 inline ros::PoseStamped pose_of(ros::Header header, const Vec3& position, const Rotation& q) {
   return {std::move(header), components(position), {q.x(), q.y(), q.z(), q.w()}};

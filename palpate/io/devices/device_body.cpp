@@ -93,9 +93,7 @@ const DevicePreset& device_preset(std::string_view name) {
   return row_of(presets, name, "device model", "none");
 }
 
-const Grip& grip_preset(std::string_view name) {
-  return row_of(grips, name, "grip", "");
-}
+const Grip& grip_preset(std::string_view name) { return row_of(grips, name, "grip", ""); }
 
 ExactStep::ExactStep(const MassSpringDamper& system, double dt) noexcept {
   const double m = system.mass;

@@ -19,9 +19,7 @@ namespace {
 
 constexpr double least_unit = 1e-6, largest_unit = 0.1;  // [m] of a RealSense's depth
 
-std::string parent(const std::string& topic) {
-  return topic.substr(0, topic.rfind('/'));
-}
+std::string parent(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
 
 // Of librealsense, whose models have names of their own.
 RealSenseLens realsense_lens(const ros::CameraInfo& info) {
@@ -260,9 +258,7 @@ double BagCamera::realsense_units(std::size_t number) const {
   return 1.0 / unit;
 }
 
-std::string BagCamera::name(std::size_t number) const {
-  return bag_.name(topic_, places_[number]);
-}
+std::string BagCamera::name(std::size_t number) const { return bag_.name(topic_, places_[number]); }
 
 std::optional<double> BagCamera::frame_rate() const {
   std::vector<std::int64_t> intervals;

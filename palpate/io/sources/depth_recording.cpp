@@ -222,9 +222,7 @@ double median_rate(const std::vector<RecordedImage>& images) {
   return 1.0 / *middle;
 }
 
-bool is_json(const fs::path& path) {
-  return path.extension() == ".json";
-}
+bool is_json(const fs::path& path) { return path.extension() == ".json"; }
 
 }  // namespace
 

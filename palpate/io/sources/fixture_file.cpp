@@ -105,9 +105,7 @@ Fixture read_fixture(const TomlTable& root, const toml::node& node, const fs::pa
   return fixture;
 }
 
-nlohmann::ordered_json triple(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
+nlohmann::ordered_json triple(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 Vec3 triple_of(const nlohmann::json& array) {
   return {array.at(0).get<double>(), array.at(1).get<double>(), array.at(2).get<double>()};

@@ -60,9 +60,7 @@ Prism ground_profile(std::vector<Vec2> surface_from_right_to_left) {
   return {std::move(outline), endless};
 }
 
-std::vector<Part> plane(const Uri& uri) {
-  return {moving(uri, HalfSpace{})};
-}
+std::vector<Part> plane(const Uri& uri) { return {moving(uri, HalfSpace{})}; }
 
 std::vector<Part> tilt(const Uri& uri) {
   const double slope = angle(uri, "slope", pi / 9.0, -1.4, 1.4);

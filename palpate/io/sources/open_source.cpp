@@ -45,9 +45,7 @@ SensorKind sensor_option(const Uri& uri, SensorKind known) {
               "give stereo, structured-light, time-of-flight or unknown");
 }
 
-std::size_t Source::skip(std::size_t /*count*/) {
-  return 0;
-}
+std::size_t Source::skip(std::size_t /*count*/) { return 0; }
 
 void Source::cancel() noexcept {}
 

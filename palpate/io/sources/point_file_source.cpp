@@ -32,9 +32,7 @@ std::string details_of(const PointFile& file) {
 }
 
 // [m] length of one unit of the files
-double scale_of(const Uri& uri) {
-  return uri.number_option("scale", 1.0, 1e-9, 1e9, "m");
-}
+double scale_of(const Uri& uri) { return uri.number_option("scale", 1.0, 1e-9, 1e9, "m"); }
 
 }  // namespace
 

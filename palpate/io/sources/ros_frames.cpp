@@ -60,9 +60,7 @@ AxisFields axis_fields_of(const ros::PointCloud2& message, const std::string& na
 }
 
 // Metres as floats.
-bool is_float(const std::string& encoding) {
-  return encoding == "32FC1";
-}
+bool is_float(const std::string& encoding) { return encoding == "32FC1"; }
 
 // "16UC1; PACKING", and the unit where it is not ROS's.
 std::string format_of(std::string_view packing, double units_per_metre) {
@@ -171,9 +169,7 @@ void read_points(const ros::PointCloud2& message, const std::string& name, RosFr
   }
 }
 
-std::string above(const std::string& topic) {
-  return topic.substr(0, topic.rfind('/'));
-}
+std::string above(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
 
 }  // namespace
 

@@ -39,9 +39,7 @@ constexpr std::uint64_t bits(std::uint64_t key, std::uint64_t index) {
   return mix(key + golden * index);
 }
 
-constexpr double share(std::uint32_t random) {
-  return (random + 0.5) * 0x1p-32;
-}
+constexpr double share(std::uint32_t random) { return (random + 0.5) * 0x1p-32; }
 
 // Acklam's rational approximation of the inverse normal distribution; relative error 1.2e-9. This
 // is its central part; beyond that it still increases with p, but is not accurate.

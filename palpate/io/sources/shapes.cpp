@@ -13,9 +13,7 @@ using Vec2 = Eigen::Vector2d;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-Vec2 xz(const Vec3& v) {
-  return {v.x(), v.z()};
-}
+Vec2 xz(const Vec3& v) { return {v.x(), v.z()}; }
 
 // The smaller positive root of a s^2 + 2 b s + c = 0, or infinity.
 double first_root(double a, double b, double c) {
@@ -267,26 +265,16 @@ double cast_on(const Wave& shape, const Vec3& origin, const Vec3& direction) {
   return infinity;
 }
 
-double bound(const HalfSpace& /*shape*/) {
-  return infinity;
-}
-double bound(const Sphere& shape) {
-  return shape.radius;
-}
-double bound(const Capsule& shape) {
-  return shape.radius + shape.half_length;
-}
-double bound(const Cylinder& shape) {
-  return std::hypot(shape.radius, shape.half_length);
-}
+double bound(const HalfSpace& /*shape*/) { return infinity; }
+double bound(const Sphere& shape) { return shape.radius; }
+double bound(const Capsule& shape) { return shape.radius + shape.half_length; }
+double bound(const Cylinder& shape) { return std::hypot(shape.radius, shape.half_length); }
 double bound(const Prism& shape) {
   double squared = 0.0;
   for (const Vec2& p : shape.outline) squared = std::max(squared, p.squaredNorm());
   return std::hypot(std::sqrt(squared), shape.half_length);
 }
-double bound(const Wave& /*shape*/) {
-  return infinity;
-}
+double bound(const Wave& /*shape*/) { return infinity; }
 
 }  // namespace
 

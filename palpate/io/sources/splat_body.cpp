@@ -34,9 +34,7 @@ bool is_spz(const std::filesystem::path& path) {
   return lower_case(path.extension().string()) == ".spz";
 }
 
-Eigen::Matrix3d axes_of(const Gaussian& g) {
-  return g.turn.cast<double>().toRotationMatrix();
-}
+Eigen::Matrix3d axes_of(const Gaussian& g) { return g.turn.cast<double>().toRotationMatrix(); }
 
 // Half the sides of the box about an ellipsoid of reach_of_sigma.
 Vec3 half_sides(const Gaussian& g) {

@@ -258,8 +258,6 @@ std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
                                            std::move(info));
 }
 
-std::unique_ptr<Source> open_synthetic(const Uri& uri) {
-  return open_synthetic_camera(uri);
-}
+std::unique_ptr<Source> open_synthetic(const Uri& uri) { return open_synthetic_camera(uri); }
 
 }  // namespace palpate

@@ -105,9 +105,7 @@ class DepthReadings {
 };
 
 /// Is this depth reading a measurement? 0 is "none", 65535 "saturated".
-constexpr bool is_measured(std::uint16_t raw) noexcept {
-  return raw != 0 && raw != 65535;
-}
+constexpr bool is_measured(std::uint16_t raw) noexcept { return raw != 0 && raw != 65535; }
 
 /// One capture of a depth camera: 16-bit depth as it came, touched in place.
 ///

@@ -161,9 +161,7 @@ ColourMap::ColourMap(std::shared_ptr<const MaterialTable> table,
     throw Error("material map", "it has no table, key or image", "give all three");
 }
 
-bool ColourMap::is_by_pixel() const noexcept {
-  return !image_->camera;
-}
+bool ColourMap::is_by_pixel() const noexcept { return !image_->camera; }
 
 const std::uint8_t* ColourMap::colour(std::size_t pixel, const Vec3& point) const noexcept {
   if (!image_->camera)

@@ -50,9 +50,7 @@ bool CsvColumns::next(std::span<double> values) {
   return true;
 }
 
-std::string CsvColumns::where() const {
-  return subject_ + ": line " + std::to_string(line_);
-}
+std::string CsvColumns::where() const { return subject_ + ": line " + std::to_string(line_); }
 
 std::string CsvColumns::header() const {
   std::string header;

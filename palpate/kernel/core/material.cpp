@@ -51,9 +51,7 @@ void set_parameter(Material& material, std::string_view name, double value) {
   set_by_name(material_table(), material, name, value, material_noun);
 }
 
-void validate(const Material& material) {
-  check_ranges(material_table(), material, material_noun);
-}
+void validate(const Material& material) { check_ranges(material_table(), material, material_noun); }
 
 Material blend(const SurfaceSample& sample, const Material& scene, double hardest) noexcept {
   if (sample.count == 0) return scene;

@@ -101,9 +101,7 @@ inline double log(double x) noexcept {
 }
 
 /// The length of (x, y), which must not overflow when squared.
-inline double hypot(double x, double y) noexcept {
-  return std::sqrt(x * x + y * y);
-}
+inline double hypot(double x, double y) noexcept { return std::sqrt(x * x + y * y); }
 
 namespace detail {
 // sin and cos for |x| <= pi / 4.
@@ -138,12 +136,8 @@ inline double turned_sin(double x, std::int64_t quarter_turns) noexcept {
 }  // namespace detail
 
 /// Of an angle [rad] of at most 1e6.
-inline double sin(double x) noexcept {
-  return detail::turned_sin(x, 0);
-}
-inline double cos(double x) noexcept {
-  return detail::turned_sin(x, 1);
-}
+inline double sin(double x) noexcept { return detail::turned_sin(x, 0); }
+inline double cos(double x) noexcept { return detail::turned_sin(x, 1); }
 
 /// [rad] The angle whose cosine is `c` from -1 to 1, from 0 to pi. Within 1e-15.
 inline double acos(double c) noexcept {
@@ -159,8 +153,6 @@ inline double acos(double c) noexcept {
 }
 
 /// x^p of x >= 0. Within 16 units of the last place for p of 2.4 and x from 0.01 to 1.
-inline double pow(double x, double p) noexcept {
-  return x == 0.0 ? 0.0 : exp(p * log(x));
-}
+inline double pow(double x, double p) noexcept { return x == 0.0 ? 0.0 : exp(p * log(x)); }
 
 }  // namespace palpate::math

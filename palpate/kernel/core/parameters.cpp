@@ -226,9 +226,7 @@ constexpr std::string_view noun = "parameter";
 
 }  // namespace
 
-std::span<const ParameterInfo> parameter_table() {
-  return table;
-}
+std::span<const ParameterInfo> parameter_table() { return table; }
 
 void set_parameter(Parameters& parameters, std::string_view name, double value) {
   set_by_name(parameter_table(), parameters, name, value, noun);

@@ -25,9 +25,7 @@ constexpr std::array<TickFlagInfo, tick_flag_count> flag_table{{
 
 }  // namespace
 
-std::span<const TickFlagInfo> tick_flag_table() {
-  return flag_table;
-}
+std::span<const TickFlagInfo> tick_flag_table() { return flag_table; }
 
 const char* to_string(ContactState state) noexcept {
   switch (state) {

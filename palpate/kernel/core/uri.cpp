@@ -71,9 +71,7 @@ Uri::Uri(std::string_view text) : text_(text) {
   }
 }
 
-bool Uri::has(std::string_view key) const {
-  return options_.find(key) != options_.end();
-}
+bool Uri::has(std::string_view key) const { return options_.find(key) != options_.end(); }
 
 std::string Uri::text_option(std::string_view key, std::string_view fallback) const {
   const auto option = options_.find(key);

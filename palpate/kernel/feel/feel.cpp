@@ -90,9 +90,7 @@ Feel::Texture Feel::texture(const Vec3& push, const Movement& movement) noexcept
   return felt;
 }
 
-Tick Feel::tick(const Vec3& hip, double t) noexcept {
-  return tick(HandPose{.position = hip}, t);
-}
+Tick Feel::tick(const Vec3& hip, double t) noexcept { return tick(HandPose{.position = hip}, t); }
 
 // Hazard: material-force
 Tick Feel::tick(const HandPose& hand, double t) noexcept {

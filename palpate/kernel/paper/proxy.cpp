@@ -26,9 +26,7 @@ constexpr double no_direction = 1e-6;
 // A step shorter than this [m] is none: the proxy is blocked where it is.
 constexpr double no_step = 1e-12;
 
-constexpr double square(double x) {
-  return x * x;
-}
+constexpr double square(double x) { return x * x; }
 
 // Is x finite? A test of its bits, as this file is compiled with -ffinite-math-only and a cloud may
 // hold points that are NaN.

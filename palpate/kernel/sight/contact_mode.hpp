@@ -60,9 +60,7 @@ constexpr bool touches(ContactMode mode) noexcept {
   return mode != free && mode != approaching && mode != free_hidden;
 }
 /// Is the surface hidden, and held as it was?
-constexpr bool is_hidden(ContactMode mode) noexcept {
-  return mode >= ContactMode::free_hidden;
-}
+constexpr bool is_hidden(ContactMode mode) noexcept { return mode >= ContactMode::free_hidden; }
 /// Is a surface followed, or held?
 constexpr bool is_followed(ContactMode mode) noexcept {
   return mode != ContactMode::free && mode != ContactMode::on_stray_points;

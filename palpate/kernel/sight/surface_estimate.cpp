@@ -40,15 +40,11 @@ constexpr double same_centre = 2e-4;
 // felt.
 constexpr double hysteresis = 0.5;
 
-constexpr double squared(double x) {
-  return x * x;
-}
+constexpr double squared(double x) { return x * x; }
 
 // How many standard deviations, themselves estimated with so many degrees of freedom, are exceeded
 // as rarely as `z` known ones: Student's quantile, by Fisher's expansion.
-double t_quantile(double z, double freedom) {
-  return z + z * (z * z + 1.0) / (4.0 * freedom);
-}
+double t_quantile(double z, double freedom) { return z + z * (z * z + 1.0) / (4.0 * freedom); }
 
 // Variance of heights that do not move [m^2], all but the newest; 0 if there are too few.
 double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t frames) {
@@ -131,9 +127,7 @@ void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
   for (Cells& past : cells_) past.full = false;
 }
 
-double SurfaceEstimate::height_sd() const noexcept {
-  return std::sqrt(variance(mover_));
-}
+double SurfaceEstimate::height_sd() const noexcept { return std::sqrt(variance(mover_)); }
 
 double SurfaceEstimate::beam_sd() const noexcept {
   double most = 0.0;

@@ -164,9 +164,7 @@ std::int32_t kth_key(const std::int32_t* keys, std::size_t size, std::size_t k) 
   return static_cast<std::int32_t>(low);
 }
 
-constexpr std::int32_t ordered(std::int32_t bits) {
-  return bits ^ ((bits >> 31) & 0x7fffffff);
-}
+constexpr std::int32_t ordered(std::int32_t bits) { return bits ^ ((bits >> 31) & 0x7fffffff); }
 
 // Coefficients from metres to units [m]: a term of degree d has the unit m^(1-d).
 Vec6 in_units(const Vec6& metres, double unit) {
@@ -252,9 +250,7 @@ Eigen::Matrix<double, 6, 6> Moments::normal_matrix() const noexcept {
   return a;
 }
 
-Vec6 Moments::right_side() const noexcept {
-  return Eigen::Map<const Vec6>(z.data());
-}
+Vec6 Moments::right_side() const noexcept { return Eigen::Map<const Vec6>(z.data()); }
 
 void Moments::raise(const Quadric& surface, double unit) noexcept {
   const Vec6 c = in_units(surface.c, unit);

@@ -13,9 +13,7 @@ namespace {
 // Lengths are in multiples of `detail`.
 // Along a line of sight a surface is looked for this far from where it is expected [detail].
 constexpr double reach_in_details = 60.0;
-double reach(const SurfaceEstimate& surface) {
-  return reach_in_details * surface.detail();
-}
+double reach(const SurfaceEstimate& surface) { return reach_in_details * surface.detail(); }
 // Occluders are looked for this far in front of the surface [detail]: an arm may be held high.
 constexpr double occluder_reach = 240.0;
 constexpr double most_support = 0.7;     // beyond this share nothing else is checked

@@ -104,9 +104,7 @@ RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
   says_.regions.write(ros::String{fixtures_json(*regions_)});
   says_.fault.write(ros::String{""});
 }
-RobotEnd::~RobotEnd() {
-  detach();
-}
+RobotEnd::~RobotEnd() { detach(); }
 
 void RobotEnd::prepare(SessionOptions& options) const {
   options.open_devices.at(0) = std::make_unique<Borrowed>(hand_);

@@ -41,9 +41,7 @@ LedHand::LedHand(const Vec3& begin, const LeadLimits& limits, std::string uri)
   info_.limits = no_motors;
 }
 
-void LedHand::lead(const Lead& lead, double now) {
-  leads_.put({lead, now});
-}
+void LedHand::lead(const Lead& lead, double now) { leads_.put({lead, now}); }
 
 void LedHand::tool_is_at(const Vec3& place) {
   if (is_place(place)) tools_.put(place);

@@ -13,9 +13,7 @@ double SimulatedTool::stiffness() {
   return mass * w * w;
 }
 
-double SimulatedTool::damping() {
-  return 2.0 * std::sqrt(stiffness() * mass);
-}
+double SimulatedTool::damping() { return 2.0 * std::sqrt(stiffness() * mass); }
 
 template <class Force>
 void SimulatedTool::advance(const Force& force, double t, double dt) {

@@ -29,9 +29,7 @@ constexpr double turn_time = 0.2;        // [s] in which a normal that turned ro
 constexpr double acceleration = 1.0;     // [m/s^2] of what is led, after a contact
 
 // The share of the way to its goal that a first-order lag goes in dt.
-double share_of(double dt, double time) {
-  return 1.0 - std::exp(-dt / time);
-}
+double share_of(double dt, double time) { return 1.0 - std::exp(-dt / time); }
 
 Vec3 no_longer_than(const Vec3& v, double longest) {
   const double size = v.norm();

@@ -83,9 +83,7 @@ std::string_view option_of(std::string_view target, std::string_view key) {
   return {};
 }
 
-std::string_view view(beast::string_view text) {
-  return {text.data(), text.size()};
-}
+std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
 // Whom a connection comes from: an address, of IPv6 the network, as one machine has many.
 std::string source_of(const tcp::socket& socket) {
@@ -887,21 +885,11 @@ ViewerServer::ViewerServer(const ViewerOptions& options, ViewerHost& host)
     : impl_(std::make_unique<Impl>(options, host)) {}
 ViewerServer::~ViewerServer() = default;
 
-std::uint16_t ViewerServer::port() const {
-  return impl_->port();
-}
-std::string ViewerServer::url(const std::string& host) const {
-  return impl_->url(host);
-}
-std::string ViewerServer::operator_url() const {
-  return impl_->operator_url();
-}
-std::string ViewerServer::opening_url() const {
-  return impl_->opening_url();
-}
-std::size_t ViewerServer::viewers() const {
-  return impl_->viewers();
-}
+std::uint16_t ViewerServer::port() const { return impl_->port(); }
+std::string ViewerServer::url(const std::string& host) const { return impl_->url(host); }
+std::string ViewerServer::operator_url() const { return impl_->operator_url(); }
+std::string ViewerServer::opening_url() const { return impl_->opening_url(); }
+std::size_t ViewerServer::viewers() const { return impl_->viewers(); }
 void ViewerServer::show(std::uint8_t camera, ViewerMessage message) {
   impl_->show(camera, std::move(message));
 }

@@ -33,9 +33,7 @@ constexpr std::array<const char*, 7> tools = {
     "ball",        "box:40x20x5mm",    "box:30x30x30mm", "capsule:80x8mm", "cylinder:40x20mm",
     "cone:60x6mm", "gripper:40x30x8mm"};
 
-json numbers(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
+json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 json energy_of(const PortEnergy& port) {
   return {{"made", port.made}, {"generating", port.generating}};

@@ -3,6 +3,4 @@
 #pragma once
 
 #define PR_SET_TIMERSLACK 29
-inline int prctl(int /*option*/, ...) {
-  return 0;
-}
+inline int prctl(int /*option*/, ...) { return 0; }

@@ -56,4 +56,11 @@ std::optional<Frame> PythonSource::next(double /*timeout*/) {
   }
 }
 
+std::unique_ptr<Source> open_python_source(const py::object& camera) {
+  auto source = std::make_unique<PythonSource>(camera);
+  if (!py::hasattr(camera, "scale_reference")) return source;
+  const std::string uri = source->info().uri;
+  return with_scale_reference(std::move(source), py::str(camera.attr("scale_reference")), uri);
+}
+
 }  // namespace palpate::python

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
+#include <memory>
 
 #include "palpate/io/sources/source.hpp"
 
@@ -28,5 +28,9 @@ class PythonSource final : public Source {
   SourceInfo info_;
   py::object frames_;
 };
+
+/// The camera that an object is, brought to metres where it has an attribute `scale_reference`
+/// (with_scale_reference). [with the lock] @throws Error as these do
+std::unique_ptr<Source> open_python_source(const py::object& camera);
 
 }  // namespace palpate::python

@@ -110,8 +110,7 @@ class PythonSession {
       const bool is_uri = py::isinstance<py::str>(one);
       options.cameras.push_back({.uri = is_uri ? py::cast<std::string>(one) : ""});
       options.open_cameras.push_back(
-          is_uri ? nullptr
-                 : std::make_unique<PythonSource>(py::reinterpret_borrow<py::object>(one)));
+          is_uri ? nullptr : open_python_source(py::reinterpret_borrow<py::object>(one)));
     }
     options.hands[0].device = device;
     options.method = method;

@@ -158,6 +158,13 @@ def _tool(rows, panels):
            xscale="log", xlim=(1e-4, 10))
 
 
+def _turning(rows, panels):
+    ways = {"free_rate": "without a bound", "rate": "with a session's"}
+    marks = [dict(row, method=name, rate=row[column])
+             for row in rows for column, name in ways.items()]
+    _cases(marks, panels, lambda row: f"{row['tool']} {row['grip']}", "rate", "stiffest")
+
+
 def _splat(rows, panels):
     _cases(rows, panels, lambda row: f"{row['body']} {row['splat']}", "held", "error")
 
@@ -248,9 +255,9 @@ def _trace(rows, panels):
 
 FIGURES = {"flat": _flat, "single-lift": _single_lift, "lift": _lift, "bound": _bound,
            "corners": _corners, "scan": _scan, "fidelity": _aims, "feel": _aims,
-           "zwidth": _zwidth, "tool": _tool, "materials": _materials, "teleop": _teleop,
-           "teleop-faults": _teleop_faults, "pop": _held, "field": _right, "visits": _right,
-           "real": _real, "splat": _splat, "growth": _growth}
+           "zwidth": _zwidth, "tool": _tool, "turning": _turning, "materials": _materials,
+           "teleop": _teleop, "teleop-faults": _teleop_faults, "pop": _held, "field": _right,
+           "visits": _right, "real": _real, "splat": _splat, "growth": _growth}
 
 
 def draw(file):

@@ -102,9 +102,9 @@ class Session(unittest.TestCase):
         self.assertTrue(palpate.safety_flags(int(ticks["safety"][0])))
 
     def test_touches_what_an_object_gives_as_it_touches_its_source(self):
-        def ticks(camera):
+        def ticks(camera, duration=2.0):
             with palpate.Session(camera, free_running=True, stroke_time=2.0) as session:
-                session.run(2.0)
+                session.run(duration)
                 return session.ticks(), session.state()["cameras"][0]
 
         source = palpate.Source(CAMERA)
@@ -114,6 +114,21 @@ class Session(unittest.TestCase):
         self.assertEqual(of_object.tobytes(), of_source.tobytes())
         self.assertEqual(camera["uri"], "python:generator")
         self.assertGreater(numpy.linalg.norm(of_object["force"], axis=1).max(), 0.2)
+
+        class Halved:
+            scale_reference = "plane:0,0,1,1"
+
+            def __iter__(self):
+                image = palpate.DepthImage(numpy.full((120, 160), 480, numpy.uint16),
+                                           palpate.Camera(160, 120, 150, 150, 79.5, 59.5))
+                return iter([(image, i / 30) for i in range(90)])
+
+        class Farther(Halved):
+            scale_reference = "plane:0,0,1,0.5"
+
+        for camera, is_unsure in ((Halved(), True), (Farther(), False)):
+            safety = ticks(camera, 2.5)[0]["safety"]
+            self.assertEqual("scale_unsure" in palpate.safety_flags(int(safety[-1])), is_unsure)
 
         def breaks():
             yield frames[0].cloud, 0.0

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tools with a shape at places where the truth is known, beside a penalty of the same points.
+// Tools with a shape at places where the truth is known, beside penalties of the same points.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -148,24 +151,83 @@ HandPose rested(const Scene& scene, const ToolShape& shape, const HandPose& hand
   return pose;
 }
 
-// What is published more often: each point of the shell that is behind the newest frame pushes
-// along its inward normal by its depth, together as stiff as the coupling. There is no proxy.
-Tick penalty(const ToolShape& shape, const DepthImage& image, const HandPose& hand, double t) {
-  constexpr double deepest = 30e-3;  // [m] what is deeper is behind something else
+constexpr double deepest = 30e-3;  // [m] what is deeper is behind something else
+
+// [m] how far a place is behind what the newest frame shows along its line of sight; below 0 in
+// front. None where nothing is known.
+std::optional<double> depth_behind(const DepthImage& image, const Vec3& place) {
+  const Intrinsics& k = image.intrinsics();
+  const Vec3 p = image.world_from_camera().inverse() * place;
+  const int u = static_cast<int>(std::lround(k.cx + k.fx * p.x() / p.z()));
+  const int v = static_cast<int>(std::lround(k.cy + k.fy * p.y() / p.z()));
+  if (u < 0 || v < 0 || u >= k.width || v >= k.height) return std::nullopt;
+  const double z = image.depth_at(u, v);
+  return z > 0.0 ? std::optional(p.z() - z) : std::nullopt;
+}
+
+// The newest frame as a field of such depths in voxels about the tool, as planners and simulators
+// have it; its gradient points into the surface.
+class VoxelField {
+ public:
+  void take(const DepthImage& image, const Vec3& place, double reach) {
+    spacing_ = 2.0 * (reach + deepest) / (side - 1);
+    low_ = place - Vec3::Constant(0.5 * (side - 1) * spacing_);
+    depth_.clear();
+    for (int i = 0; i < side * side * side; ++i) {
+      const Vec3 at = low_ + spacing_ * Vec3(i % side, i / side % side, i / (side * side));
+      depth_.push_back(std::clamp(depth_behind(image, at).value_or(-deepest), -deepest, deepest));
+    }
+  }
+  // Interpolated. @return the depth, and its gradient
+  [[nodiscard]] std::pair<double, Vec3> at(const Vec3& place) const {
+    const Vec3 q = (place - low_) / spacing_;
+    std::pair<double, Vec3> found{-deepest, Vec3::Zero()};
+    if (!(q.minCoeff() >= 0.0 && q.maxCoeff() < side - 1)) return found;
+    const Eigen::Vector3i cell = q.cast<int>();
+    const Vec3 part = q - cell.cast<double>();
+    found.first = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3i bit(corner & 1, corner >> 1 & 1, corner >> 2);
+      const Eigen::Vector3i of = cell + bit;
+      const double depth =
+          depth_[static_cast<std::size_t>((of.z() * side + of.y()) * side + of.x())];
+      const Vec3 share =
+          bit.cast<double>().cwiseProduct(2.0 * part - Vec3::Ones()) + Vec3::Ones() - part;
+      found.first += depth * share.prod();
+      for (int k = 0; k < 3; ++k)
+        found.second[k] += depth * (bit[k] ? 1.0 : -1.0) * share[(k + 1) % 3] * share[(k + 2) % 3];
+    }
+    return found;
+  }
+
+ private:
+  static constexpr int side = 64;
+  double spacing_ = 0.0;  // [m]
+  Vec3 low_ = Vec3::Zero();
+  std::vector<double> depth_;  // [m]
+};
+
+// What is published more often: each point of the shell that is behind the surface pushes by its
+// depth, together as stiff as the coupling: along its inward normal, or out of a field of voxels.
+// There is no proxy.
+Tick penalty(const ToolShape& shape, const DepthImage& image, const VoxelField* voxels,
+             const HandPose& hand, double t) {
   Tick tick = free_tick(hand.position, t, 0);
   tick.orientation = tick.proxy_orientation = hand.orientation;
-  const Intrinsics& k = image.intrinsics();
   double depths = 0.0, squares = 0.0;
   for (const auto& point : shape.points()) {
     const Vec3 lever = hand.orientation * point.at;
-    const Vec3 p = image.world_from_camera().inverse() * (hand.position + lever);
-    const int u = static_cast<int>(std::lround(k.cx + k.fx * p.x() / p.z()));
-    const int v = static_cast<int>(std::lround(k.cy + k.fy * p.y() / p.z()));
-    if (u < 0 || v < 0 || u >= k.width || v >= k.height) continue;
-    const double z = image.depth_at(u, v);
-    const double depth = p.z() - z;
-    if (z <= 0.0 || depth <= 0.0 || depth > deepest) continue;
-    const Vec3 force = depth * (hand.orientation * point.inward);
+    double depth = 0.0;
+    Vec3 way = hand.orientation * point.inward;
+    if (voxels != nullptr) {
+      const auto [behind, gradient] = voxels->at(hand.position + lever);
+      depth = behind;
+      way = -gradient.normalized();
+    } else {
+      depth = depth_behind(image, hand.position + lever).value_or(0.0);
+    }
+    if (depth <= 0.0 || depth > deepest) continue;
+    const Vec3 force = depth * way;
     tick.force += force;
     tick.torque += lever.cross(force);
     depths += depth;
@@ -232,14 +294,18 @@ std::string row_of(ToolCase one, const std::string& sensor, const std::string& m
   }
   ShapeTouch touch(shape, {});
   std::shared_ptr<const Cloud> newest;
+  VoxelField voxels;
   const Felt felt = play(one, *shape, camera, setup.frame_rate, scene,
                          [&](const Frame* frame, const HandPose& hand, double t) {
                            if (frame != nullptr) {
                              touch.observe({*frame->cloud, frame->stamp});
                              newest = frame->cloud;
+                             if (method == "voxels")
+                               voxels.take(*newest->image(), hand.position, shape->reach());
                            }
-                           return method == "shape" ? touch.tick(hand, t)
-                                                    : penalty(*shape, *newest->image(), hand, t);
+                           if (method == "shape") return touch.tick(hand, t);
+                           return penalty(*shape, *newest->image(),
+                                          method == "voxels" ? &voxels : nullptr, hand, t);
                          });
   if (one.is_coming())
     return csv_row(one.name, sensor, method, seed, "", "", "", "", "", "", felt.longest);
@@ -272,7 +338,7 @@ std::vector<Cell> tool_cells(const Experiment& /*experiment*/, const ExperimentO
     for (const char* sensor : {"ideal", "d4xx"}) {
       const bool repeats = std::string_view(sensor) != "ideal" || one.is_coming();
       for (int i = 0; i < (repeats ? options.cases.value_or(3) : 1); ++i)
-        for (const char* method : {"shape", "penalty"})
+        for (const char* method : {"shape", "penalty", "voxels"})
           cells.emplace_back([=, seed = options.seed + static_cast<std::uint64_t>(i)] {
             return row_of(one, sensor, method, seed);
           });

@@ -34,17 +34,18 @@ double value(const Table& table, const std::string& camera, const std::string& m
 
 TEST(ToolExperiment, ABoxThatLiesFlatHasTheTrueForceAndAPenaltyHasNot) {
   const Table table = run_of("flat");
-  ASSERT_EQ(table.rows(), 4U);
+  ASSERT_EQ(table.rows(), 6U);
   for (const char* camera : {"ideal", "d4xx"}) {
     EXPECT_NEAR(value(table, camera, "shape", "force"), 3.0, 1e-3) << "600 N/m by 5 mm";
     EXPECT_LT(value(table, camera, "shape", "force_error"), 0.05) << camera;
     EXPECT_GT(value(table, camera, "penalty", "force_error"), 0.2) << camera;
+    EXPECT_GT(value(table, camera, "voxels", "force_error"), 0.05) << camera;
     EXPECT_EQ(value(table, camera, "shape", "behind"), 0.0) << camera;
   }
   EXPECT_LT(value(table, "ideal", "shape", "torque_error"), 0.05);
   const Experiment& tool = find_experiment("tool");
   const Scores scores = tool.scores(table);
-  ASSERT_EQ(scores.rows.size(), 4U);
+  ASSERT_EQ(scores.rows.size(), 6U);
   EXPECT_EQ(scores.rows[0].size(), scores.columns.size());
 }
 
@@ -53,6 +54,7 @@ TEST(ToolExperiment, APlateStaysBeforeASurfaceThatComesAndAPenaltyDoesNot) {
   for (const char* camera : {"ideal", "d4xx"}) {
     EXPECT_LT(value(table, camera, "shape", "behind"), 0.1) << camera;
     EXPECT_GT(value(table, camera, "penalty", "behind"), 0.3) << camera;
+    EXPECT_GT(value(table, camera, "voxels", "behind"), 0.3) << camera;
   }
   EXPECT_EQ(find_experiment("tool").scores(table).rows[0][3], "-") << "no truth of forces there";
 }

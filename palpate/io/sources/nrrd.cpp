@@ -203,8 +203,8 @@ class SurfaceNet {
 
   const Volume& volume_;
   PointFile& mesh_;
-  std::array<std::vector<std::uint32_t>, 2>
-      points_;  // of the cells of this layer and the one below
+  // Numbers of the points of the cells of this layer and the one below.
+  std::array<std::vector<std::uint32_t>, 2> points_;
 };
 
 }  // namespace

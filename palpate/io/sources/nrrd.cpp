@@ -229,7 +229,7 @@ PointFile parse_nrrd(std::span<const std::byte> bytes, std::string_view name,
   take_values(volume, data.data(), level);
   PointFile mesh;
   mesh.encoding = volume.is_gzip ? "gzip" : "raw";
-  SurfaceNet(volume, mesh);
+  const SurfaceNet net(volume, mesh);
   if (mesh.triangles.empty())
     file.fail("no surface: its values do not pass " + number_text(level) + " where it was seen",
               "give the value at the surface as ?level=");

@@ -162,8 +162,8 @@ class ScaledSource final : public Source {
     if (!seen_) {  // where most of them are alike
       const auto all = std::pair(begin, end);
       end = begin;
-      At last = begin;
-      for (At first = all.first; first != all.second; ++first) {
+      auto last = begin;
+      for (auto first = all.first; first != all.second; ++first) {
         while (last != all.second && *last <= *first * (1.0 + 2.0 * band)) ++last;
         if (last - first > end - begin) std::tie(begin, end) = std::pair(first, last);
       }

@@ -214,8 +214,8 @@ SetPoint::Order RobotStep::next(ServoTick& tick, const Outlook& outlook, const V
   const bool in_the_open = tick.tick.state == ContactState::free_motion;
   hand_.sees(tick.frame_age <= blind_after && !outlook.is_lost);
   const double clear = outlook.clearance - radius_;
-  const double ahead = (tick.place - at.position).norm();
-  hand_.clearance(in_the_open ? clear - ahead : 0.0);
+  const double way = (tick.place - at.position).norm();
+  hand_.clearance(in_the_open ? clear - way : 0.0);
   at.force =
       force_zero_.next(now, at.force, in_the_open && !outlook.is_lost && clear > ForceZero::clear);
   hand_.kept_out(tick.place - tick.tick.proxy);

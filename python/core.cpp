@@ -162,7 +162,7 @@ class Renderer {
   }
 
   Tick tick(const Numbers& hip, double t, const std::optional<Numbers>& orientation) {
-    const Tick tick = method_->tick(HandPose{vector_of(hip, "hip"), rotation_of(orientation)}, t);
+    Tick tick = method_->tick(HandPose{vector_of(hip, "hip"), rotation_of(orientation)}, t);
     trouble_->rethrow();
     return tick;
   }

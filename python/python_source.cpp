@@ -37,7 +37,7 @@ PythonSource::PythonSource(const py::object& camera) {
 
 PythonSource::~PythonSource() {
   const py::gil_scoped_acquire lock;
-  frames_ = py::object();
+  frames_ = py::iterator();
 }
 
 std::optional<Frame> PythonSource::next(double /*timeout*/) {

@@ -26,7 +26,7 @@ class PythonSource final : public Source {
 
  private:
   SourceInfo info_;
-  py::object frames_;
+  py::iterator frames_;
 };
 
 /// The camera that an object is, brought to metres where it has an attribute `scale_reference`

@@ -15,9 +15,9 @@ namespace palpate::lab {
 // The experiments, in the order of the report: a file of lab/experiments defines `Experiment
 // NAME_experiment()`. Adding an experiment: that, and its name here.
 // clang-format off
-#define PALPATE_EXPERIMENTS(name)                                                           \
-  name(flat) name(single_lift) name(lift) name(bound) name(corners) name(scan)              \
-  name(fidelity) name(feel) name(zwidth) name(tool) name(turning) name(splat) name(materials)    \
+#define PALPATE_EXPERIMENTS(name)                                                             \
+  name(flat) name(single_lift) name(lift) name(bound) name(corners) name(scan)                \
+  name(fidelity) name(feel) name(zwidth) name(tool) name(turning) name(splat) name(materials) \
   name(teleop) name(teleop_faults) name(pop) name(field) name(visits) name(real)
 // clang-format on
 

@@ -17,9 +17,11 @@ std::shared_ptr<const Cloud> without_python(std::shared_ptr<Cloud> cloud) {
   const DepthImage* image = cloud->image();
   if (image == nullptr) return cloud;
   const auto depth = image->depth();
-  return std::make_shared<const DepthImage>(image->shared_rays(),
-                                            std::vector<std::uint16_t>(depth.begin(), depth.end()),
-                                            image->units_per_metre(), image->world_from_camera());
+  auto copy = std::make_shared<DepthImage>(
+      image->shared_rays(), std::vector<std::uint16_t>(depth.begin(), depth.end()),
+      image->units_per_metre(), image->world_from_camera(), image->brightness());
+  copy->set_materials(image->materials());
+  return copy;
 }
 
 }  // namespace

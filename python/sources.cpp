@@ -174,14 +174,20 @@ void define_sources(py::module_& m) {
           "colour", &colour_of,
           "uint8 (height, width, 3), not to be written to; None if there is none");
   // What its cloud has; where that is no depth image, only points.
-  for (const char* name : {"depth", "camera", "units_per_metre", "world_from_camera"})
+  using Named = std::pair<const char*, const char*>;  // and its meaning
+  for (const auto& [name, meaning] :
+       {Named{"depth", "of a depth image: uint16 (height, width), not to be written to, no copy"},
+        Named{"camera", "as DepthImage has it"}, Named{"units_per_metre", "as DepthImage has it"},
+        Named{"world_from_camera", "as DepthImage has it"}})
     frame.def_property_readonly(
-        name, [name](const Frame& self) { return py::object(cloud_of(self).attr(name)); },
-        "as DepthImage has it");
-  for (const char* name : {"metres", "points"})
+        name, [name = name](const Frame& self) { return py::object(cloud_of(self).attr(name)); },
+        meaning);
+  for (const auto& [name, meaning] :
+       {Named{"metres", "Depth [m] as float32 (height, width), NaN where nothing was measured."},
+        Named{"points", "All measured points [m, world], an array (n, 3)."}})
     frame.def(
-        name, [name](const Frame& self) { return py::object(cloud_of(self).attr(name)()); },
-        "As DepthImage has it.");
+        name, [name = name](const Frame& self) { return py::object(cloud_of(self).attr(name)()); },
+        meaning);
 
   py::class_<FrameSource>(m, "Source",
                           "Frames of a camera or recording, in the order of capture: iterate over "

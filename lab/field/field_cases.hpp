@@ -58,8 +58,8 @@ struct FieldClass {
   std::string_view summary;
   /// Fills in the setting. @param start  [s] when the camera has shown the scene
   void (*make)(Draw&, Setting&, double start);
-  double most_tilt =
-      1.22;  ///< [rad] of the camera off straight above, if not set there; 70 degrees
+  /// [rad] of the camera off straight above, if `make` does not set it; 70 degrees
+  double most_tilt = 1.22;
 };
 
 /// A camera, how far from the hand it is, and when it sees.

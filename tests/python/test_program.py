@@ -130,6 +130,15 @@ class Session(unittest.TestCase):
             safety = ticks(camera, 2.5)[0]["safety"]
             self.assertEqual("scale_unsure" in palpate.safety_flags(int(safety[-1])), is_unsure)
 
+        soft = palpate.Materials([{"name": "foam", "stiffness": 50}])
+        ones = numpy.ones((120, 160), numpy.uint8)
+        of_foam = [(palpate.DepthImage(frame.depth, frame.camera, frame.units_per_metre,
+                                       frame.world_from_camera, materials=soft, labels=ones),
+                    frame.stamp) for frame in frames]
+        largest = [numpy.linalg.norm(made["force"], axis=1).max()
+                   for made in (ticks(of for of in of_foam)[0], of_source)]
+        self.assertLess(largest[0], 0.5 * largest[1])
+
         def breaks():
             yield frames[0].cloud, 0.0
             raise RuntimeError("out of memory")

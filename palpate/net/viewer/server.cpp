@@ -759,8 +759,9 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
 
   // What pages draw of the splat that is felt. @return whether there is one
   bool give_splat(const Request& request) {
+    if (request.method() == http::verb::head) return false;
     splat_ = server_.host_.gaussians();
-    if (splat_.empty() || request.method() == http::verb::head) return false;
+    if (splat_.empty()) return false;
     Response& response = response_.emplace(http::status::ok, request.version());
     set_head(response, "application/octet-stream");
     response.keep_alive(false);

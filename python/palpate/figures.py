@@ -159,10 +159,16 @@ def _tool(rows, panels):
 
 
 def _turning(rows, panels):
+    rate, stiffest = panels(2, 2)
+    tool = lambda row: f"{row['tool']} {row['grip']}"
     ways = {"free_rate": "without a bound", "rate": "with a session's"}
     marks = [dict(row, method=name, rate=row[column])
              for row in rows for column, name in ways.items()]
-    _cases(marks, panels, lambda row: f"{row['tool']} {row['grip']}", "rate", "stiffest")
+    _groups(rate, marks, tool, lambda own: float(own[0]["rate"]),
+            xlabel="rate of turning [rad/s]")
+    _groups(stiffest, [dict(row, method="stiffest at rest") for row in rows], tool,
+            lambda own: float(own[0]["stiffest"]), xscale="log",
+            xlabel="stiffness in rotation [N m/rad]")
 
 
 def _splat(rows, panels):

@@ -60,6 +60,11 @@ test("shows a scene that moves", async () => {
   await expect.poll(() => connection.textContent(), { timeout: 20_000 }).toBe("connected");
   expect(await page.locator("#camera").textContent()).toContain("moving");
   expect(await page.locator("#camera").getAttribute("title")).toContain("synthetic:moving");
+  // The force, its state and its reason follow each other, without room for what is not shown.
+  const parts = [".hud .force", ".hud .where", "#why"].map((of) => page.locator(of).boundingBox());
+  const [force, where, why] = (await Promise.all(parts)).map((box) => box!);
+  expect(where!.y - force!.y - force!.height).toBeLessThan(8);
+  expect(why!.y - where!.y - where!.height).toBeLessThan(8);
   // Cameras, hand and sensor are without noise: what changes in the scene's middle is the slab.
   const clip = { x: 150, y: 200, width: 400, height: 350 };
   const first = await page.screenshot({ clip });

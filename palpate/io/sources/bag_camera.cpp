@@ -343,7 +343,7 @@ Frame BagCamera::own_frame(std::size_t number, RosFrame seen) {
       std::make_shared<DepthImage>(rays, std::move(seen.depth), numbers[1], world_from_camera);
   if (numbers.size() > 14 && numbers[14] != 0.0)
     cloud->set_materials(materials(number, numbers[14], numbers[15]));
-  if (numbers.size() > 16) cloud->rescale(1.0, numbers[16] != 0.0);
+  if (numbers.size() > 16) cloud->set_scale_unsure(numbers[16] != 0.0);
   return Frame{numbers[0], std::move(cloud)};
 }
 

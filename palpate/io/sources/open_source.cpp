@@ -177,11 +177,8 @@ class PosedSource final : public Source {
   }
   [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) const {
     if (const DepthImage* image = cloud.image()) {
-      auto moved =
-          std::make_shared<DepthImage>(image->shared_rays(), image->depth(),
-                                       image->units_per_metre(), pose_, image->brightness());
-      moved->set_materials(image->materials());
-      moved->rescale(1.0, image->scale_unsure());
+      auto moved = std::make_shared<DepthImage>(*image);
+      moved->set_world_from_camera(pose_);
       return moved;
     }
     const PointCloud* points = cloud.point_cloud();

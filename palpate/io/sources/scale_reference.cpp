@@ -72,7 +72,8 @@ class ScaledSource final : public Source {
     look(*image, frame->stamp);
     const bool is_sure = seen_ && frame->stamp - last_ <= patience && last_ - first_ >= settling;
     auto scaled = std::make_shared<DepthImage>(*image);
-    scaled->rescale(scale_, !is_sure);
+    scaled->rescale(scale_);
+    scaled->set_scale_unsure(!is_sure);
     frame->cloud = std::move(scaled);
     look_at_info();
     info_.details += (info_.details.empty() ? "" : ", ") + std::string("depth times ") +

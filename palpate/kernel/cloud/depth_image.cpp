@@ -340,7 +340,6 @@ DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, DepthReadings de
       depth_(std::move(depth)),
       units_per_metre_(units_per_metre),
       metres_per_unit_(1.0 / units_per_metre),
-      world_from_camera_(world_from_camera),
       brightness_(std::move(brightness)) {
   if (!rays_) throw Error("depth image", "it has no camera", "give its viewing rays");
   const Intrinsics& k = rays_->intrinsics();
@@ -360,7 +359,12 @@ DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, DepthReadings de
     throw Error("depth image", "units per metre must be positive",
                 "give 1000 for millimetres or 5000 for the TUM benchmark");
   }
-  check_rigid(world_from_camera_, "camera pose");
+  set_world_from_camera(world_from_camera);
+}
+
+void DepthImage::set_world_from_camera(const Eigen::Isometry3d& world_from_camera) {
+  check_rigid(world_from_camera, "camera pose");
+  world_from_camera_ = world_from_camera;
 }
 
 void DepthImage::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {

@@ -152,13 +152,16 @@ class DepthImage final : public Cloud {
   }
 
   [[nodiscard]] bool scale_unsure() const noexcept override { return scale_unsure_; }
+  void set_scale_unsure(bool is_unsure) noexcept { scale_unsure_ = is_unsure; }  ///< likewise
   /// Multiplies all depths, its readings staying as they are. Before the image is shared.
   /// @param factor  > 0
-  void rescale(double factor, bool is_unsure) noexcept {
+  void rescale(double factor) noexcept {
     units_per_metre_ /= factor;
     metres_per_unit_ = 1.0 / units_per_metre_;
-    scale_unsure_ = is_unsure;
   }
+  /// The same image of a camera elsewhere. Before the image is shared.
+  /// @throws Error if the pose is not rigid and finite.
+  void set_world_from_camera(const Eigen::Isometry3d& world_from_camera);
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }

@@ -131,6 +131,15 @@ def _right(rows, panels):
             xlabel="right [%]", xlim=(-2, 102))
 
 
+def _cameras(rows, panels):
+    names = {"first": "first alone", "second": "second alone", "both": "both",
+             "weighed": "weighed by variance"}
+    marks = [dict(row, rig=f"{row['rig']} {row['method']}", method=name, rms=row[column])
+             for row in rows for column, name in names.items()]
+    _groups(*panels(1), marks, lambda row: row["rig"], lambda own: float(own[0]["rms"]),
+            xlabel="force at rest [N rms]", xscale="log")
+
+
 def _zwidth(rows, panels):
     """The worst of scenes and cameras, beside theory."""
     axes, = panels(1)
@@ -261,8 +270,8 @@ def _trace(rows, panels):
 
 FIGURES = {"flat": _flat, "single-lift": _single_lift, "lift": _lift, "bound": _bound,
            "corners": _corners, "scan": _scan, "fidelity": _aims, "feel": _aims,
-           "zwidth": _zwidth, "tool": _tool, "turning": _turning, "materials": _materials,
-           "teleop": _teleop, "teleop-faults": _teleop_faults, "pop": _held, "field": _right,
+           "cameras": _cameras, "zwidth": _zwidth, "tool": _tool, "turning": _turning,
+           "materials": _materials, "teleop": _teleop, "teleop-faults": _teleop_faults, "pop": _held, "field": _right,
            "visits": _right, "real": _real, "splat": _splat, "growth": _growth}
 
 

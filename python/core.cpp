@@ -423,6 +423,19 @@ void define_renderer(py::module_& m) {
       .def_property_readonly(
           "proxy_orientation", [](const Tick& tick) { return tick.proxy_orientation.coeffs(); },
           "of the proxy, likewise; of a ball that of the hand")
+      .def_property_readonly(
+          "contacts",
+          [](const Tick& tick) {
+            Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> rows(tick.contact_count, 6);
+            for (std::uint32_t i = 0; i < tick.contact_count; ++i) {
+              const ContactPush& contact = tick.contacts[i];
+              rows.row(i) << (tick.proxy + contact.lever.cast<double>()).transpose(),
+                  contact.force.cast<double>().transpose();
+            }
+            return rows;
+          },
+          "where surfaces push a tool with a shape, at most six rows: x, y, z of the place [m,\n"
+          "world], and of the force there [N, world]; of a ball none")
       .def_readonly("state", &Tick::state)
       .def_readonly("steps", &Tick::steps, "proxy steps taken")
       .def_readonly("surface_velocity", &Tick::surface_velocity, "[m/s] towards the proxy")

@@ -92,6 +92,7 @@ class Tick:
     torque: Final[NDArray[numpy.float64]]
     orientation: Final[NDArray[numpy.float64]]
     proxy_orientation: Final[NDArray[numpy.float64]]
+    contacts: Final[NDArray[numpy.float64]]
     state: Final[State]
     steps: Final[int]
     surface_velocity: Final[float]

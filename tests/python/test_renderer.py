@@ -41,6 +41,7 @@ class Renderer(unittest.TestCase):
             tick = touch.tick((0, 0, 0.95), 1e-3 * i, tilted)
         numpy.testing.assert_allclose(tick.orientation, tilted)
         numpy.testing.assert_array_equal(tick.torque, 0)
+        self.assertEqual(tick.contacts.shape, (0, 6))
         for i in range(400):
             tick = touch.tick((0, 0, 0.9951), 0.2 + 1e-3 * i, tilted)
         # The edge at +y is 10 mm sin 0.2 + 2.5 mm cos 0.2 = 4.4 mm ahead of the hand.
@@ -50,6 +51,10 @@ class Renderer(unittest.TestCase):
         self.assertLess(tick.force[2], -1)
         self.assertLess(tick.torque[0], -5e-3)
         self.assertLess(tick.proxy_orientation[0], tick.orientation[0])
+        place, push = tick.contacts[:, :3], tick.contacts[:, 3:]
+        numpy.testing.assert_allclose(push.sum(axis=0), tick.force, atol=0.01)
+        numpy.testing.assert_allclose(place[:, 2], 1.0, atol=2e-4)
+        self.assertTrue((place[:, 1] > 8e-3).all())
         for wrong, message in (((0, 0, 0, 2), "length"), ((0, 0, 1), "shape")):
             with self.assertRaisesRegex(palpate.Error, message):
                 touch.tick((0, 0, 0.9), 2.0, wrong)

@@ -161,6 +161,57 @@ TEST(ShapeTouch, StandsOnAnEdgeAndOnACorner) {
   }
 }
 
+// The forces and moments that a tick's contacts give together.
+Wrench6 pushed_by_contacts(const Tick& tick, const Vec3& about) {
+  Wrench6 sum{Vec3::Zero(), Vec3::Zero()};
+  std::vector<Vec3> levers;
+  EXPECT_LE(tick.contact_count, tick.contacts.size());
+  for (std::size_t i = 0; i < tick.contact_count; ++i) {
+    const Vec3 lever = tick.contacts[i].lever.cast<double>();
+    const Vec3 force = tick.contacts[i].force.cast<double>();
+    for (const Vec3& other : levers) EXPECT_GT((other - lever).norm(), 1e-4) << "one of each place";
+    levers.push_back(lever);
+    sum.force += force;
+    sum.torque += (tick.proxy + lever - about).cross(force);
+  }
+  return sum;
+}
+
+void expect_contacts_give_it(const Tick& tick) {
+  const Vec3 force = tick.force - tick.transient - tick.vibration;
+  EXPECT_GT(force.norm(), 0.1);
+  for (const Vec3& about : {tick.proxy, tick.hip}) {
+    const Wrench6 sum = pushed_by_contacts(tick, about);
+    EXPECT_LT((sum.force - force).norm(), 1e-3 * force.norm())
+        << sum.force.transpose() << " for " << force.transpose();
+    EXPECT_LT((sum.torque - tick.torque).norm(), 1e-3 * force.norm() * 20e-3)
+        << sum.torque.transpose() << " for " << tick.torque.transpose();
+  }
+}
+
+TEST(ShapeTouch, SaysWhereItIsHeld) {
+  const auto shape = tool("box:40x20x5mm");
+  for (const Vec3& turn : {Vec3(0, 0, 0), Vec3(0, 0.3, 0), Vec3(0.25, 0.3, 0.0)}) {
+    const Rotation rotation = rotation_by(turn);
+    Vec3 lowest = Vec3::Zero();
+    for (const ToolShape::Point& point : shape->points())
+      if (const Vec3 lever = rotation * point.at; lever.z() < lowest.z()) lowest = lever;
+    Stage stage(plane());
+    const Tick tick = stage.press(pose({0, 0, -lowest.z() - 5e-3}, turn));
+    expect_contacts_give_it(tick);
+    for (std::size_t i = 0; i < tick.contact_count; ++i) {
+      // On the plane, and at the tool's edge or corner.
+      EXPECT_NEAR(tick.proxy.z() + tick.contacts[i].lever.z(), 0.0, 0.1e-3);
+      EXPECT_NEAR(tick.contacts[i].force.normalized().z(), 1.0, 1e-3);
+      if (!turn.isZero()) {
+        EXPECT_NEAR(tick.contacts[i].lever.x(), lowest.x(), 1e-3);
+      }
+    }
+    const Tick away = stage.run(0.5, [&](double) { return pose({0, 0, 0.03}, turn); });
+    EXPECT_EQ(away.contact_count, 0U);
+  }
+}
+
 // Two planes at 45 degrees to the vertical, which meet along an axis.
 Scene valley(const Vec3& axis) {
   Part left = part(HalfSpace{}), right = left;
@@ -297,6 +348,7 @@ TEST(ToolFriction, AHeldPlateDoesNotCreep) {
     EXPECT_LT((tick.proxy - before).head<2>().norm(), 1e-4) << sensor;
     EXPECT_LT(tick.force.head<2>().norm() / tick.force.z(), 0.6) << sensor;
     EXPECT_GT(tick.force.head<2>().norm(), 0.7) << sensor;
+    if (std::string(sensor) == "ideal") expect_contacts_give_it(tick);
   }
 }
 
@@ -330,6 +382,17 @@ TEST(ToolFriction, EachContactHasTheMaterialUnderIt) {
   const Tick on_soft = stage.press(pose({-0.04, 0, -2.5e-3}));
   EXPECT_NEAR(on_soft.force.z(), 150.0 * 5e-3, 0.05);
   EXPECT_NEAR(on_soft.hardness, 0.25, 1e-6);
+  expect_contacts_give_it(on_soft);
+  // What becomes harder under a hand that rests, the tank does not pay for.
+  Material harder;
+  harder.stiffness = 400.0;
+  Stage hardened(plane());
+  hardened.materials = stage.materials;
+  hardened.press(pose({-0.04, 0, -2.5e-3}));
+  hardened.materials = std::make_shared<LeftHalf>(harder);
+  const Tick unpaid = hardened.run(0.3, [](double) { return pose({-0.04, 0, -2.5e-3}); });
+  EXPECT_LT(unpaid.hardness, 0.5);
+  expect_contacts_give_it(unpaid);
   stage.run(0.2, [](double) { return pose({0, 0, 0.02}); });
   EXPECT_NEAR(stage.press(pose({0.04, 0, -2.5e-3})).force.z(), 3.0, 0.1);
   // Two fingers, the left one on the soft half: each gives half of 3 N, and that a quarter of it.
@@ -339,6 +402,7 @@ TEST(ToolFriction, EachContactHasTheMaterialUnderIt) {
   EXPECT_NEAR(on_both.force.z(), 1.5 + 0.25 * 1.5, 0.1);
   EXPECT_LT(on_both.torque.y(), -(1.5 - 0.375) * 14e-3) << "about the fingers' inner edges";
   EXPECT_GT(on_both.torque.y(), -(1.5 - 0.375) * 24e-3) << "about their outer edges";
+  expect_contacts_give_it(on_both);
 }
 
 // Hazard: material-force
@@ -422,6 +486,7 @@ TEST(ShapeTouch, KeepsThePartsOfOneWrenchAtItsLimit) {
   EXPECT_NEAR(tick.force.norm(), 1.0, 1e-9);
   EXPECT_TRUE((tick.flags & force_saturated) != 0);
   EXPECT_NEAR(tick.torque.norm(), 1.0 * 19e-3, 2e-3);
+  expect_contacts_give_it(tick);
 }
 
 // Hazard: tool-pushes
@@ -433,9 +498,12 @@ TEST(ShapeTouch, LetsGoWhereFramesDoNotCome) {
   const auto hand = [&](double) { return at; };
   EXPECT_LT((stage.run(0.05, hand).force - pressed.force).norm(), 1e-9)
       << "one that is late takes nothing";
-  EXPECT_LT(stage.run(0.09, hand).torque.norm(), 0.9 * pressed.torque.norm());
+  const Tick fading = stage.run(0.09, hand);
+  EXPECT_LT(fading.torque.norm(), 0.9 * pressed.torque.norm());
+  expect_contacts_give_it(fading);
   const Tick gone = stage.run(0.2, hand);
   EXPECT_TRUE(gone.force.isZero(0.0) && gone.torque.isZero(0.0));
+  EXPECT_EQ(gone.contact_count, 0U);
   stage.streams = true;
   EXPECT_TRUE(stage.run(0.5, hand).force.isZero(0.0)) << "until it has been free";
 }
@@ -485,6 +553,7 @@ TEST(ShapeTouch, LetsGoOfAHandThatIsFarAway) {
       [&](const Tick& each) {
         lets_go = lets_go || (each.flags & proxy_let_go) != 0;
         EXPECT_LT((each.proxy - each.hip).norm(), 0.302);
+        EXPECT_EQ(each.contact_count > 0, !each.force.isZero(0.0));
       });
   EXPECT_TRUE(lets_go);
   EXPECT_TRUE(tick.force.isZero(0.0));

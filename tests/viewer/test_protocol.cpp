@@ -146,12 +146,15 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   record.tick.orientation = {0.5, 0.25, -0.25, 0.125};
   record.tick.proxy_orientation = {1.0, 2.0, 3.0, 4.0};
   record.torque = {0.0, 0.0, 0.75};
+  record.tick.proxy = Vec3(1.0, 2.0, 3.0);
+  record.tick.contact_count = 2;
+  record.tick.contacts[1] = {{0.5F, 0.0F, -0.5F}, {0.0F, 0.0F, 4.0F}};
   for (std::size_t i = 0; i < TickBatch::max_samples + 10; ++i)
     batch.samples.push_back(
         {100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F, 4e-4F, -5e-4F});
   const ViewerMessage message = ticks_message(batch);
   EXPECT_EQ(at<std::uint16_t>(message.head, 2), TickBatch::max_samples);
-  ASSERT_EQ(message.head.size(), 156 + 28 * TickBatch::max_samples);
+  ASSERT_EQ(message.head.size(), 160 + 2 * 24 + 28 * TickBatch::max_samples);
   EXPECT_EQ(at<std::uint32_t>(message.head, 4), 5u);
   EXPECT_EQ(at<double>(message.head, 8), 100.0);
   EXPECT_EQ(at<std::uint32_t>(message.head, 16), 1u << 12);
@@ -167,10 +170,15 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   EXPECT_EQ(at<float>(message.head, 124), 0.5F) << "w last";
   EXPECT_EQ(at<float>(message.head, 140), 1.0F);
   EXPECT_EQ(at<float>(message.head, 152), 0.75F);
-  EXPECT_NEAR(at<float>(message.head, 156), 0.010, 1e-6) << "the first ten are the oldest";
-  EXPECT_EQ(at<float>(message.head, 156 + 16), 3e-6F);
-  EXPECT_EQ(at<float>(message.head, 156 + 20), 4e-4F);
-  EXPECT_EQ(at<float>(message.head, 156 + 24), -5e-4F);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 156), 2u);
+  EXPECT_EQ(at<float>(message.head, 160), 1.0F) << "at the proxy";
+  EXPECT_EQ(at<float>(message.head, 184), 1.5F);
+  EXPECT_EQ(at<float>(message.head, 192), 2.5F);
+  EXPECT_EQ(at<float>(message.head, 204), 1.0F) << "as the gain is";
+  EXPECT_NEAR(at<float>(message.head, 208), 0.010, 1e-6) << "the first ten are the oldest";
+  EXPECT_EQ(at<float>(message.head, 208 + 16), 3e-6F);
+  EXPECT_EQ(at<float>(message.head, 208 + 20), 4e-4F);
+  EXPECT_EQ(at<float>(message.head, 208 + 24), -5e-4F);
 }
 
 TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {

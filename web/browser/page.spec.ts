@@ -78,14 +78,15 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
   const tool = () =>
     page.evaluate(() => {
       const { view, newest } = (window as any).palpate;
-      const { orientation, proxyOrientation, torque } = newest().tick;
+      const { orientation, proxyOrientation, torque, force, contacts } = newest().tick;
       const turn = (tool: any) => (tool.visible ? tool.quaternion.toArray() : null);
       return {
         ...{ proxy: turn(view.heldTool), hand: turn(view.handTool), ball: view.proxy.visible },
         ...{ ring: view.turning.visible, orientation, proxyOrientation, torque, reach: view.reach },
+        ...{ force, contacts, arrows: view.contacts.filter((mark: any) => mark.visible).length },
       };
     });
-  expect(await tool()).toMatchObject({ proxy: null, ball: true, reach: 0 });
+  expect(await tool()).toMatchObject({ proxy: null, ball: true, reach: 0, arrows: 0 });
   expect(await page.locator("#torque").textContent()).toBe("");
   await page.locator("#tool").selectOption("box:40x20x5mm");
   await expect.poll(async () => (await tool()).ball).toBe(false);
@@ -113,6 +114,12 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
   const angle = async () => 2 * Math.asin(Math.hypot(...(await tool()).orientation.slice(0, 3)));
   await expect.poll(angle).toBeCloseTo(0.3, 2);
   const turned = await tool();
+  // An arrow at each contact: on the plane, together the force.
+  expect(turned.arrows).toBeGreaterThan(0);
+  expect(turned.arrows).toBeLessThanOrEqual(turned.contacts.length);
+  for (const { at } of turned.contacts) expect(Math.abs(at[2])).toBeLessThan(0.001);
+  const pushes: number[] = turned.contacts.map(({ push }: any) => push[2]);
+  expect(pushes.reduce((sum, push) => sum + push)).toBeCloseTo(turned.force[2], 1);
   const halfAngle = Math.asin(Math.hypot(...turned.orientation.slice(0, 3)));
   const kept = Math.asin(Math.hypot(...turned.proxyOrientation.slice(0, 3)));
   expect(kept).toBeLessThan(halfAngle);
@@ -123,6 +130,7 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
   await page.keyboard.up("g");
   await page.mouse.up();
   await until(page, (seen) => seen.force === 0 && seen.hip[2]! > 0.015);
+  await expect.poll(async () => (await tool()).arrows).toBe(0);
   expect((await tool()).orientation[3]).toBeCloseTo(turned.orientation[3], 3);
 
   // In the air a drag with the key turns it, and touches nothing.

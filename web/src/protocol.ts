@@ -11,7 +11,8 @@ const Colours = { none: 0, registered: 1, ownCamera: 2 } as const;
 
 const FRAME_HEADER = 96;
 const COLOUR_HEADER = 72;
-const TICKS_HEADER = 156;
+const TICKS_HEADER = 160;
+const CONTACT_BYTES = 24;
 // The numbers of a sample, in the order of the message; `t` as the time before the newest tick.
 const SAMPLE = ["t", "force", "penetration", "steps", "tickTime", "relative", "absolute"] as const;
 const RAYS_HEADER = 12;
@@ -73,7 +74,14 @@ export interface Ticks {
   orientation: Quat; // world_from_handle
   proxyOrientation: Quat; // of the tool that surfaces keep outside; of a ball that of the handle
   torque: Vec3; // [N m] world: as sent, or, where the device has no motors for it, as it would be
+  contacts: Contact[]; // of a tool with a shape
   samples: Sample[];
+}
+
+/** A place where a surface pushes a tool. */
+export interface Contact {
+  at: Vec3; // [m]
+  push: Vec3; // [N] on the tool, as far as the safety chain has faded it in
 }
 
 /** A few ticks in one: the extremes of what matters. */
@@ -181,9 +189,13 @@ function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
 function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
   need(buffer.byteLength >= TICKS_HEADER, "ticks without their header");
   const count = view.getUint16(2, true);
-  need(buffer.byteLength === TICKS_HEADER + count * 4 * SAMPLE.length, "ticks cut short");
+  const behind = TICKS_HEADER + CONTACT_BYTES * view.getUint32(156, true);
+  need(buffer.byteLength === behind + count * 4 * SAMPLE.length, "ticks cut short");
   const t = view.getFloat64(8, true);
-  const values = new Float32Array(buffer, TICKS_HEADER);
+  const contacts: Contact[] = [];
+  for (let at = TICKS_HEADER; at < behind; at += CONTACT_BYTES)
+    contacts.push({ at: vec3(view, at), push: vec3(view, at + 12) });
+  const values = new Float32Array(buffer, behind);
   const samples: Sample[] = [];
   for (let i = 0; i < values.length; i += SAMPLE.length) {
     const row = SAMPLE.map((name, k) => [name, values[i + k]!] as const);
@@ -212,6 +224,7 @@ function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
     orientation: quat(view, 112),
     proxyOrientation: quat(view, 128),
     torque: vec3(view, 144),
+    contacts,
     samples,
   };
 }

@@ -12,18 +12,22 @@ import {
 import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import { nearestAbout, type Place } from "./pointers";
-import type { Frame, OtherHand, Rays, Ticks, Tool, Vec3 } from "./protocol";
+import type { Contact, Frame, OtherHand, Rays, Ticks, Tool, Vec3 } from "./protocol";
 import { SplatCloud } from "./splat";
 import type { Spot } from "./surface";
 import { SOFTWARE_LEVEL, Thinning } from "./thinning";
 
 const ARROW_PER_NEWTON = 0.055; // of the view's height
 const LONGEST_ARROW = 0.4; // likewise
+const ARROW_WIDTH = 0.006; // likewise
+const CONTACT_WIDTH = 0.004; // likewise: of a contact's arrow
+const LEAST_FORCE = 0.01; // [N] that is drawn
 const RING_PER_NEWTON_METRE = 0.5; // of the view's height: the torque's radius
 const RINGS = [0.04, 0.15] as const; // likewise: least and most
 const TOOL_EDGES = 30; // [degrees] between faces that have an edge
 const LEAST_TORQUE = 1e-3; // [N m] that is drawn
 const PIN = 3.2; // contact radii
+const MOST_CONTACTS = 6; // of a tool
 const TRAIL = 360; // ticks messages
 /** Places of the line behind the recorded hand. */
 export const GHOST_TRAIL = 60;
@@ -86,6 +90,7 @@ const BALL = new THREE.SphereGeometry(1, 48, 32);
 const HIDDEN_TOO = { depthTest: false, transparent: true } as const;
 const FLAT = { ...HIDDEN_TOO, side: THREE.DoubleSide } as const;
 
+const NO_CONTACT: Contact = { at: [0, 0, 0], push: [0, 0, 0] };
 const NO_TOOL: Tool = { kind: "tool", points: new Float32Array(), triangles: new Uint32Array() };
 
 type Ball = THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
@@ -106,6 +111,12 @@ function segments(opacity: number) {
 // A cylinder one long that stands on its origin.
 function rod(radius: number, sides: number): THREE.CylinderGeometry {
   return new THREE.CylinderGeometry(radius, radius, 1, sides).translate(0, 0.5, 0);
+}
+
+// A shaft and a head along y, which `point` stretches.
+function arrow(material: THREE.Material): THREE.Group {
+  const head = new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0);
+  return new THREE.Group().add(...[rod(1, 20), head].map((part) => new THREE.Mesh(part, material)));
 }
 
 // Three quarters of a ring about z, with a point: the way that something turns.
@@ -189,13 +200,8 @@ export class SceneView {
     rod(0.09, 12),
     new THREE.MeshStandardMaterial({ roughness: 0.6 }),
   );
-  private readonly arrow = new THREE.Group();
   private readonly arrowMaterial = new THREE.MeshStandardMaterial({ roughness: 0.5 });
-  private readonly shaft = new THREE.Mesh(rod(1, 20), this.arrowMaterial);
-  private readonly head = new THREE.Mesh(
-    new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0),
-    this.arrowMaterial,
-  );
+  private readonly arrow = arrow(this.arrowMaterial);
   // The tool in the hand, if it has a shape: held off by surfaces, and as the hand holds it.
   private readonly heldTool = new THREE.Mesh(
     new THREE.BufferGeometry(),
@@ -207,8 +213,9 @@ export class SceneView {
   );
   private readonly handToolEdges = segments(1);
   reach = 0; // [m] of the tool from the hand; 0: it is a ball
-  private readonly turningMaterial = new THREE.MeshBasicMaterial({ depthTest: false });
-  private readonly turning = turningArrow(this.turningMaterial);
+  private readonly overlay = new THREE.MeshBasicMaterial({ depthTest: false }); // before the tool
+  private readonly turning = turningArrow(this.overlay);
+  private readonly contacts = Array.from({ length: MOST_CONTACTS }, () => arrow(this.overlay));
   private readonly lamp = new THREE.DirectionalLight(0xffffff, 2.2);
   private readonly trailPoints: number[] = [];
   private palette!: Palette;
@@ -239,7 +246,6 @@ export class SceneView {
 
     this.paint.count = 0;
     this.paint.frustumCulled = false;
-    this.arrow.add(this.shaft, this.head);
     const lines = [
       ...[this.link, this.plumb, this.trail, this.ghostTrail, this.ruler],
       ...[this.grid, this.frusta, this.push, this.otherLines],
@@ -252,21 +258,21 @@ export class SceneView {
     this.handTool.renderOrder = 1;
     this.handTool.add(this.handToolEdges);
     this.handToolEdges.material.depthTest = false;
-    for (const part of [this.handToolEdges, ...this.turning.children]) part.renderOrder = 2;
+    const turning = [this.turning, ...this.contacts].flatMap((mark) => mark.children);
+    for (const part of [this.handToolEdges, ...turning]) part.renderOrder = 2;
     this.ring.renderOrder = 4;
 
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.ruler, this.shadow, this.spot, this.grid, this.frusta, this.axes],
       ...[this.ghost, this.ghostTrail, this.paint, this.tool, this.arm, this.push],
-      ...[this.otherLines, this.heldTool, this.handTool, this.turning],
+      ...[this.otherLines, this.heldTool, this.handTool, this.turning, this.arrow],
+      ...this.contacts,
     ];
     for (const mark of marks) mark.visible = false;
-    this.arrow.visible = false;
     this.scene.add(
       ...marks,
       this.felt,
-      this.arrow,
       this.fixtures,
       this.lamp,
       new THREE.HemisphereLight(0xffffff, 0x8899aa, 1.6),
@@ -288,7 +294,7 @@ export class SceneView {
         ...[this.ghost, this.ghostTrail, this.ring, this.plumb, this.pin, this.ruler, this.grid],
       ].map((mark) => mark.material),
       calm: [this.trail, this.spot, this.frusta, this.tool, this.arm].map((mark) => mark.material),
-      force: [this.turningMaterial, this.acting, this.push.material, this.arrowMaterial],
+      force: [this.overlay, this.acting, this.push.material, this.arrowMaterial],
       fixture: [this.idle],
     };
     for (const [name, materials] of Object.entries(drawn))
@@ -501,13 +507,12 @@ export class SceneView {
 
   showTick(tick: Ticks): void {
     const before = this.tick;
-    const parts = [
-      ...(["hip", "place", "force", "normal", "torque"] as const),
-      ...(["orientation", "proxyOrientation"] as const),
-    ];
-    const moves = parts.some(
-      (part) => !before || tick[part].some((x, i) => Math.abs(x - before[part][i]!) > 1e-5),
-    );
+    const drawn = (of: Ticks) => [
+      ...[of.hip, of.place, of.force, of.normal, of.torque, of.orientation, of.proxyOrientation],
+      ...of.contacts.flatMap(({ at, push }) => [at, push]),
+    ].flat();
+    const [now, last] = [drawn(tick), before ? drawn(before) : []];
+    const moves = now.length !== last.length || now.some((x, i) => Math.abs(x - last[i]!) > 1e-5);
     this.tick = tick;
     // What rests is not drawn anew thirty times a second.
     if (!moves && this.trailPoints.length === 0 && tick.state === before?.state) return;
@@ -788,18 +793,11 @@ export class SceneView {
     this.pin.visible = hasNormal && this.reach === 0;
     if (hasNormal) this.stand(this.pin, tick.proxy, tick.normal, r_c, PIN * r_c);
 
-    const newtons = length(tick.force);
-    const shown = Math.min(newtons * ARROW_PER_NEWTON, LONGEST_ARROW) * size * this.height;
-    this.arrow.visible = newtons > 0.01;
-    if (this.arrow.visible) {
-      const direction = unit(tick.force);
-      const foot = add(tick.place, scale(direction, this.reach > 0 ? 0 : r_c));
-      const thickness = 0.006 * size * this.height;
-      const headLength = Math.min(0.4 * shown, 4 * thickness);
-      this.stand(this.shaft, [0, 0, 0], [0, 1, 0], thickness * 0.55, shown - headLength);
-      this.stand(this.head, [0, shown - headLength, 0], [0, 1, 0], thickness * 1.5, headLength);
-      this.stand(this.arrow, foot, direction, 1, 1);
-    }
+    const force = { at: tick.place, push: tick.force };
+    this.point(this.arrow, force, ARROW_WIDTH, this.reach > 0 ? 0 : r_c);
+    this.contacts.forEach((mark, i) =>
+      this.point(mark, tick.contacts[i] ?? NO_CONTACT, CONTACT_WIDTH),
+    );
 
     const turns = length(tick.torque);
     this.turning.visible = turns > LEAST_TORQUE;
@@ -831,6 +829,22 @@ export class SceneView {
     mark.position.set(...at);
     mark.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), new THREE.Vector3(...normal));
     mark.scale.setScalar(size);
+  }
+
+  // Makes an arrow of a push, `off` [m] before its place; none of a small one.
+  private point(mark: THREE.Group, { at, push }: Contact, width: number, off = 0): void {
+    const newtons = length(push);
+    mark.visible = newtons > LEAST_FORCE;
+    if (!mark.visible) return;
+    const [shaft, head] = mark.children;
+    const along = unit(push);
+    const view = this.height * metresPerPixel(depthOf(this.orbit, at), this.height); // [m]
+    const long = Math.min(newtons * ARROW_PER_NEWTON, LONGEST_ARROW) * view;
+    const wide = width * view;
+    const headLength = Math.min(0.4 * long, 4 * wide);
+    this.stand(shaft!, [0, 0, 0], [0, 1, 0], 0.55 * wide, long - headLength);
+    this.stand(head!, [0, long - headLength, 0], [0, 1, 0], 1.5 * wide, headLength);
+    this.stand(mark, add(at, scale(along, off)), along, 1, 1);
   }
 
   // Puts an upright mark's foot at a place and its top along a direction.

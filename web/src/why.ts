@@ -14,7 +14,9 @@ export interface Why {
   rank: number; // place in the order: the lower, the more it decides
 }
 
-type Unsaid = "kind" | "samples" | "t" | "steps" | "orientation" | "proxyOrientation" | "torque";
+type Unsaid =
+  | ("kind" | "samples" | "t" | "steps")
+  | ("orientation" | "proxyOrientation" | "torque" | "contacts");
 
 /** What it is made of. */
 export interface Facts {

@@ -34,8 +34,9 @@ function frameMessage(
   return bytes.buffer;
 }
 
-function ticksMessage(samples: number[][]): ArrayBuffer {
-  const buffer = new ArrayBuffer(156 + 28 * samples.length);
+function ticksMessage(samples: number[][], contacts: number[][] = []): ArrayBuffer {
+  const behind = 160 + 24 * contacts.length;
+  const buffer = new ArrayBuffer(behind + 28 * samples.length);
   const view = new DataView(buffer);
   view.setUint8(0, 2);
   view.setUint8(1, 1);
@@ -52,7 +53,8 @@ function ticksMessage(samples: number[][]): ArrayBuffer {
   [13, 14, 15, 2, 0.5].forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
   view.setUint32(108, 5, true);
   for (let i = 0; i < 11; ++i) view.setFloat32(112 + 4 * i, 20 + i, true);
-  samples.flat().forEach((value, i) => view.setFloat32(156 + 4 * i, value, true));
+  view.setUint32(156, contacts.length, true);
+  [...contacts, ...samples].flat().forEach((value, i) => view.setFloat32(160 + 4 * i, value, true));
   return buffer;
 }
 
@@ -169,6 +171,23 @@ describe("ticks", () => {
       ...{ t: 100, force: 5, penetration: 6, steps: 7, tickTime: 8 },
       ...{ relative: 9, absolute: 10 },
     });
+  });
+
+  test("carry where a tool is held between both", () => {
+    const samples = [[0, 5, 6, 7, 8, 9, 10]];
+    const message = ticksMessage(samples, [
+      [1, 2, 3, 0, 0, 4],
+      [5, 6, 7, 0, 2, 0],
+    ]);
+    const ticks = decode(message) as Ticks;
+    expect(ticks.contacts).toEqual([
+      { at: [1, 2, 3], push: [0, 0, 4] },
+      { at: [5, 6, 7], push: [0, 2, 0] },
+    ]);
+    expect(ticks.samples).toMatchObject([{ t: 100, force: 5, absolute: 10 }]);
+    expect((decode(ticksMessage(samples)) as Ticks).contacts).toHaveLength(0); // a ball
+    new DataView(message).setUint32(156, 0xffffffff, true);
+    expect(() => decode(message)).toThrow("cut short");
   });
 
   test("are refused when they are cut short", () => {

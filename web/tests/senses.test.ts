@@ -8,7 +8,8 @@ function tick(t: number, newtons: number, proxy: Vec3, state = 1): Ticks {
     ...{ kind: "ticks", state, flags: 0, safety: 0, t, steps: 1, frame: 0, hip: proxy, proxy },
     ...{ normal: [0, 0, 1], force: [0, 0, newtons], surfaceVelocity: 0, gain: 1 },
     ...{ askedForce: newtons, place: proxy, region: 0, guidance: 0, fixtures: 0, samples: [] },
-    ...{ orientation: [0, 0, 0, 1], proxyOrientation: [0, 0, 0, 1], torque: [0, 0, 0] },
+    ...{ orientation: [0, 0, 0, 1], proxyOrientation: [0, 0, 0, 1] },
+    ...{ torque: [0, 0, 0], contacts: [] },
   };
 }
 

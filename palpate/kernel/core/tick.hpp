@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -70,6 +71,12 @@ struct TickFlagInfo {
 /// One row for each bit of `TickFlag`, in their order.
 std::span<const TickFlagInfo> tick_flag_table();
 
+/// A place where a surface pushes a tool with a shape. In single precision, which is for telemetry.
+struct ContactPush {
+  Eigen::Vector3f lever = Eigen::Vector3f::Zero();  ///< [m] world, to it from the proxy
+  Eigen::Vector3f force = Eigen::Vector3f::Zero();  ///< [N] world, on the tool; with friction
+};
+
 /// The result of one cycle of haptic rendering: HIP in, proxy and force out.
 struct Tick {
   double t = 0.0;              ///< [s] as given
@@ -94,8 +101,15 @@ struct Tick {
   Vec3 vibration = Vec3::Zero();
   /// [-] of the coupling's stiffness that is felt, where a material is softer
   double hardness = 1.0;
-  std::int64_t frame = -1;  ///< number of the frame in use, from 0; -1 before the first
-  std::uint32_t flags = 0;  ///< TickFlag bits
+  std::int64_t frame = -1;          ///< number of the frame in use, from 0; -1 before the first
+  std::uint32_t flags = 0;          ///< TickFlag bits
+  std::uint32_t contact_count = 0;  ///< of `contacts`; of a ball always 0
+  /// Of a tool with a shape, where it is held: the coupling's force and torque by contact, as their
+  /// materials make them. While hand and surface rest, the forces add up to `force` without
+  /// `transient` and `vibration`, and the moments (lever x force), about proxy as about HIP, to
+  /// `torque`. What damps or brakes a hand that moves is of no contact. No recording has them: a
+  /// replay makes them again.
+  std::array<ContactPush, 6> contacts = {};
 };
 
 /// Can `p` [m] be a place? It is finite and within 1000 km of the origin.

@@ -64,6 +64,12 @@ Known summarise(const float* gap, std::size_t size) {
   return {least_of_lanes(least), sum_of_lanes(count)};
 }
 
+void push_nothing(Tick& tick) {
+  tick.force = tick.torque = tick.normal = tick.vibration = Vec3::Zero();
+  tick.contacts = {};
+  tick.contact_count = 0;
+}
+
 }  // namespace
 
 ShapeTouch::ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters& parameters)
@@ -422,9 +428,8 @@ double ShapeTouch::known_share(double t) const noexcept {
   return share;
 }
 
-// What the materials at the contacts make of the coupling's force and torque.
+// Where the contacts push, and what their materials make of the coupling's force and torque.
 void ShapeTouch::feel(const Pose& hand, Tick& tick) noexcept {
-  if (!feel_.feels()) return;
   std::array<ToolFeel::Pushed, 6> pushed;
   Vec3 normals = Vec3::Zero();
   for (std::size_t i = 0; i < held_.count; ++i) {
@@ -435,9 +440,19 @@ void ShapeTouch::feel(const Pose& hand, Tick& tick) noexcept {
                  contact.lever, contact.fit.normal,
                  force,         hand_velocity_at(contact.lever) - tick.surface_motion};
   }
-  if (normals.norm() > 0.0) tick.normal = normals.normalized();
-  movement_.by = hand.at - last_hand_ - movement_.dt * tick.surface_motion;
-  feel_.press(std::span(pushed.data(), held_.count), movement_, tick);
+  const std::span contacts(pushed.data(), held_.count);
+  if (feel_.feels()) {
+    if (normals.norm() > 0.0) tick.normal = normals.normalized();
+    movement_.by = hand.at - last_hand_ - movement_.dt * tick.surface_motion;
+    feel_.press(contacts, movement_, tick);
+  }
+  for (const ToolFeel::Pushed& contact : contacts) {
+    const Eigen::Vector3f lever = contact.lever.cast<float>();
+    std::uint32_t at = 0;  // one for all sides of a contact's cone of friction
+    while (at < tick.contact_count && tick.contacts[at].lever != lever) ++at;
+    tick.contact_count = std::max(tick.contact_count, at + 1);
+    tick.contacts[at] = {lever, tick.contacts[at].force + contact.force.cast<float>()};
+  }
 }
 
 // The virtual coupling, (1): what pulls the hand to the proxy, in translation and in rotation.
@@ -463,7 +478,7 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   feel(hand, tick);
   const double share = known_share(t);
   if (share <= 0.0) {
-    tick.force = tick.torque = tick.normal = tick.vibration = Vec3::Zero();
+    push_nothing(tick);
     release(hand);
     return;
   }
@@ -475,6 +490,7 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   tick.force *= scale;
   tick.torque *= scale;
   tick.vibration *= scale;
+  for (ContactPush& contact : tick.contacts) contact.force *= static_cast<float>(scale);
   tick.state = ContactState::contact;
   for (std::size_t i = 0; i < held_.count; ++i)
     if (contacts_[held_.limit[i]].fit.unseen > 0.0) tick.flags |= surface_hidden;
@@ -528,7 +544,7 @@ Tick ShapeTouch::tick(const HandPose& given, double t) noexcept {
     if (touching_) render(hand, t, tick);
     if ((pose_.at - hand.at).norm() > lost) {
       release(hand);
-      tick.force = tick.torque = tick.normal = tick.vibration = Vec3::Zero();
+      push_nothing(tick);
       tick.state = ContactState::free_motion;
       tick.flags |= proxy_let_go;
     }

@@ -39,13 +39,12 @@ double ToolFeel::friction(std::size_t patch, const Vec3& place, const Vec3& norm
 }
 
 // Hazard: material-energy, material-force
-void ToolFeel::press(std::span<const Pushed> contacts, const Movement& movement,
-                     Tick& tick) noexcept {
+void ToolFeel::press(std::span<Pushed> contacts, const Movement& movement, Tick& tick) noexcept {
   if (!feels_) return;
   double all = 0.0, hard = 0.0, most = 0.0;
   const Pushed* hardest = nullptr;
   Vec3 more = Vec3::Zero(), more_torque = Vec3::Zero(), drag = Vec3::Zero();
-  for (const Pushed& contact : contacts) {
+  for (Pushed& contact : contacts) {
     const Material& material = look(contact.patch, contact.place, contact.normal);
     const ContactMaterial& here = here_[contact.patch];
     const double pressed = contact.force.dot(contact.normal);
@@ -58,6 +57,7 @@ void ToolFeel::press(std::span<const Pushed> contacts, const Movement& movement,
     more += change;
     more_torque += contact.lever.cross(change);
     drag += contact.force - pressed * contact.normal;
+    contact.force += change;
     all += pressed;
     hard += share * pressed;
     if (pressed > most) {
@@ -83,6 +83,7 @@ void ToolFeel::press(std::span<const Pushed> contacts, const Movement& movement,
   } else {
     grain_.reset();
   }
+  for (Pushed& contact : contacts) contact.force *= paid;
   tick.force = paid * (tick.force + more) + felt.brake;
   tick.torque = (1.0 + vibration) * paid * (tick.torque + more_torque);
   tick.vibration = vibration * tick.force;

@@ -26,7 +26,7 @@ class ToolFeel {
     Vec3 place;         ///< [m] world
     Vec3 lever;         ///< [m] to it from the tool's origin
     Vec3 normal;        ///< [-]
-    Vec3 force;         ///< [N] world, friction included
+    Vec3 force;         ///< [N] world, friction included; `press` makes it what is felt
     Vec3 velocity;      ///< [m/s] of the hand's point there, relative to the surface
   };
   /// How the hand has moved since the tick before, relative to the surface.
@@ -43,7 +43,7 @@ class ToolFeel {
   double friction(std::size_t patch, const Vec3& place, const Vec3& normal, double speed) noexcept;
 
   /// Turns the coupling's force and torque into those that are felt.
-  void press(std::span<const Pushed> contacts, const Movement& movement, Tick& tick) noexcept;
+  void press(std::span<Pushed> contacts, const Movement& movement, Tick& tick) noexcept;
   /// Adds the ringing of a surface that is struck. For each tick, behind `press`.
   void ring(const Movement& movement, Tick& tick) noexcept;
 

@@ -34,7 +34,8 @@ enum class Colours : std::uint8_t { none = 0, registered = 1, own_camera = 2 };
 
 constexpr std::size_t frame_header_size = 96;
 constexpr std::size_t colour_header_size = 72;
-constexpr std::size_t ticks_header_size = 156;
+constexpr std::size_t ticks_header_size = 160;
+constexpr std::size_t contact_size = 24;
 constexpr std::size_t sample_size = 28;
 constexpr std::size_t hand_size = 32;
 constexpr std::size_t turned_hand_size = 64;  // with an orientation
@@ -182,11 +183,12 @@ ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32
 
 ViewerMessage ticks_message(const TickBatch& batch) {
   const std::size_t count = std::min(batch.samples.size(), TickBatch::max_samples);
-  ViewerMessage message;
-  message.head.reserve(ticks_header_size + count * sample_size);
-  Writer writer(message.head);
   const ServoTick& record = batch.tick;
   const Tick& tick = record.tick;
+  const auto contacts = std::span(tick.contacts).first(tick.contact_count);
+  ViewerMessage message;
+  message.head.reserve(ticks_header_size + contacts.size() * contact_size + count * sample_size);
+  Writer writer(message.head);
   Vec3 asked = record.region;
   join(tick.force, asked);
   asked += record.guidance;
@@ -198,7 +200,11 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   writer.put_float(record.gain).put_float(asked.norm()).put_vec3(record.place);
   writer.put_float(record.region.norm()).put_float(record.guidance.norm()).put(record.fixtures);
   writer.put_rotation(tick.orientation).put_rotation(tick.proxy_orientation);
-  writer.put_vec3(record.torque);
+  writer.put_vec3(record.torque).put(tick.contact_count);
+  for (const ContactPush& contact : contacts) {
+    writer.put_vec3(tick.proxy + contact.lever.cast<double>());
+    writer.put_vec3(record.gain * contact.force.cast<double>());
+  }
   const std::span<const TickSample> samples(batch.samples);
   for (const TickSample& sample : samples.last(count)) {
     writer.put_float(tick.t - sample.t).put(sample.force).put(sample.penetration);

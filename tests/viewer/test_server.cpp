@@ -318,7 +318,7 @@ TEST_F(ViewerServerTest, IntroducesItselfAndTellsOfTicks) {
   EXPECT_EQ(presence["viewers"], 1);
   const std::string first = page.until_kind(2);
   const std::string second = page.until_kind(2);
-  ASSERT_EQ(first.size(), 156u);
+  ASSERT_EQ(first.size(), 160u);
   EXPECT_NE(first, second);
 }
 

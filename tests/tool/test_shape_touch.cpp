@@ -461,6 +461,17 @@ TEST(ShapeTouch, IsNeverBehindASurfaceThatComes) {
 }
 
 // Hazard: tool-pushes
+TEST(ShapeTouch, HoldsAHandThatIsFarBehindASurfaceFromOneTickToTheNext) {
+  for (const double depth : {0.05, 0.15}) {  // [m] less and more than the sides of bodies
+    Stage stage(plane());
+    stage.run(0.5, [](double) { return pose({0, 0, 0.02}); });
+    const Tick tick = stage.run(0.1, [&](double) { return pose({0, 0, -depth}); });
+    EXPECT_NEAR(tick.proxy.z(), 2.5e-3, 1e-3) << depth;
+    EXPECT_GT(tick.force.z(), 19.0) << depth;
+  }
+}
+
+// Hazard: tool-pushes
 TEST(ShapeTouch, IsStoppedByTheSideOfABodyOfWhichTheEdgeAloneIsSeen) {
   // A block 60 mm high beside the tool, seen from straight above.
   Part block_ = part(block(Vec3(0.05, 0.05, 0.03)));
@@ -474,6 +485,28 @@ TEST(ShapeTouch, IsStoppedByTheSideOfABodyOfWhichTheEdgeAloneIsSeen) {
   EXPECT_NEAR(tick.proxy.x(), -0.01, 1.5e-3);
   EXPECT_LT(tick.force.x(), -1.5);
   EXPECT_NEAR(tick.force.z(), 0.0, 0.5);
+}
+
+// Hazard: tool-pushes
+TEST(ShapeTouch, HardlyFeelsAnArmThatPassesBeforeTheCamera) {
+  Part arm = part(Capsule{.radius = 0.03, .half_length = 0.4});
+  arm.world_from_part.translation() = Vec3(-0.25, 0, 0.15);
+  arm.motion = {.direction = Vec3::UnitX(), .start = 3.0, .speed = 0.35};
+  for (const char* sensor : {"ideal", "d4xx"}) {
+    Stage stage(Scene({part(HalfSpace{}), arm}), "box:40x20x5mm", sensor, 0.45, 0.0);
+    const HandPose at = pose({0, 0, -2.5e-3});
+    const Vec3 before = stage.press(at).force;
+    bool is_hidden = false;
+    double most = 0.0;
+    stage.run(
+        1.6, [&](double) { return at; },
+        [&](const Tick& tick) {
+          is_hidden = is_hidden || (tick.flags & surface_hidden) != 0;
+          most = std::max(most, (tick.force - before).norm());
+        });
+    EXPECT_TRUE(is_hidden) << sensor;
+    EXPECT_LT(most, 0.4) << sensor;
+  }
 }
 
 // Hazard: tool-pushes

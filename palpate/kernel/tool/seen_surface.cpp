@@ -22,6 +22,7 @@ constexpr float most_relief = 128.0F;    // frames in a cell's mean
 constexpr double slow_intervals = 4.0;
 constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
+constexpr float flying_spreads = 2.0F;   // [-] that a reading beside an occluder may be nearer
 constexpr int rows_of_tick = 8;          // of cells that take the newest frame in
 constexpr int lag = 1;                   // [cells] by which they follow a tool late
 constexpr double longest_tick = 20e-3;   // [s] over more, nothing is smooth
@@ -58,6 +59,11 @@ constexpr double rim_spreads = 4.0;
 // [-] so much of the tool's normal is across the line of sight.
 constexpr int farthest_side = 8;
 constexpr double least_across = 0.5;
+
+// [m] What comes nearer by more between two frames hides what was there.
+float strike(const SightParameters& parameters) {
+  return static_cast<float>(farthest_strike * parameters.detail);
+}
 
 // (4), block by block: compilers make vector code of all but the look-up.
 PALPATE_VECTORISED
@@ -236,21 +242,23 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
   const int reach = std::clamp(static_cast<int>(aim.radius / pitch), 2, side / 2 - 1);
   const int step = 1 + 2 * reach / most_across;
   std::array<float, std::size_t{most_across + 1} * (most_across + 1)> values;
-  std::size_t size = 0;
+  // What comes so much nearer at once is an occluder: it measures nothing. If it hides half of the
+  // cells, the rest is too little.
+  const float hidden = frames_ > 1 ? static_cast<float>(level(stamp_)) - strike(parameters)
+                                   : std::numeric_limits<float>::lowest();
+  std::size_t size = 0, known = 0;
   for (int y = v_ + side / 2 - reach; y <= v_ + side / 2 + reach; y += step) {
     for (int x = u_ + side / 2 - reach; x <= u_ + side / 2 + reach; x += step) {
       const float relief = all.relief[index(x, y)];
       const float z = read(x, y);
-      if (z > 0.0F && relief == relief && size < values.size()) values[size++] = z - relief;
+      if (!(z > 0.0F && relief == relief && known < values.size())) continue;
+      ++known;
+      if (z - relief >= hidden) values[size++] = z - relief;
     }
   }
-  if (size < least_cells) return false;
+  if (size < least_cells || 2 * size < known) return false;
   const std::span<float> near(values.data(), size);
-  const float level = kth_smallest(near, size / 2);
-  // What comes so much nearer at once is an occluder: it measures nothing.
-  if (level < static_cast<float>(this->level(stamp_) - farthest_strike) && frames_ > 1)
-    return false;
-  newest_ = level;
+  newest_ = kth_smallest(near, size / 2);
   spread_ = next_spread(spread_, newest_, near, image_->units_per_metre());
   // How much one frame's level varies: by second differences, which no steady motion changes.
   constexpr double memory = 0.05;  // [-] of the newest of them
@@ -276,7 +284,7 @@ void SeenSurface::update(std::size_t i, float z, const SightParameters& paramete
     }
     return;
   }
-  if (z == 0.0F || z - newest_ - all.relief[i] < static_cast<float>(-farthest_strike)) {  // hidden
+  if (z == 0.0F || z - newest_ - all.relief[i] < -strike(parameters)) {  // hidden
     if (stamp_ - all.seen[i] > parameters.hidden_hold + parameters.hidden_fade) {
       all.relief[i] = all.smooth[i] = unknown;
       all.frames[i] = 0.0F;
@@ -287,11 +295,27 @@ void SeenSurface::update(std::size_t i, float z, const SightParameters& paramete
   follow_relief(z - newest_, spread_, most_relief, all.relief[i], all.drift[i], all.frames[i]);
 }
 
+// Is a reading [m] between a surface and what hides it beside this cell? It measures neither.
+bool SeenSurface::flies(int u, int v, float z, const SightParameters& parameters) const noexcept {
+  const auto above = [&](int at_u, int at_v, float reading) {
+    return reading > 0.0F ? newest_ + cells_[0].relief[index(at_u, at_v)] - reading : 0.0F;
+  };
+  if (!(above(u, v, z) > flying_spreads * spread_)) return false;  // nearly always
+  const auto is_hidden = [&](int at_u, int at_v) {
+    return at_u >= u_ && at_v >= v_ && at_u < u_ + side && at_v < v_ + side &&
+           above(at_u, at_v, read(at_u, at_v)) > strike(parameters);
+  };
+  return is_hidden(u - 1, v) || is_hidden(u + 1, v) || is_hidden(u, v - 1) || is_hidden(u, v + 1);
+}
+
 // Takes further rows of the newest frame in: all at once would be felt as a late tick.
 void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcept {
   for (; rows > 0 && rows_read_ < side; --rows, ++rows_read_) {
     const int v = v_ + ((rows_read_ - v_) & (side - 1));  // each row of the memory once
-    for (int u = u_; u < u_ + side; ++u) update(index(u, v), read(u, v), parameters);
+    for (int u = u_; u < u_ + side; ++u) {
+      const float z = read(u, v);
+      update(index(u, v), flies(u, v, z, parameters) ? 0.0F : z, parameters);
+    }
   }
 }
 

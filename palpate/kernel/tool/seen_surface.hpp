@@ -134,6 +134,7 @@ class SeenSurface {
   [[nodiscard]] float read(int u, int v) const noexcept;
   bool find_level(const Aim& aim, const SightParameters& parameters) noexcept;
   void update(std::size_t i, float z, const SightParameters& parameters) noexcept;
+  [[nodiscard]] bool flies(int u, int v, float z, const SightParameters& parameters) const noexcept;
   void read_rows(int rows, const SightParameters& parameters) noexcept;
   [[nodiscard]] Vec3 in_camera(const Vec3& place) const noexcept;
   /// [m] from cell to cell, z [m] before the camera.

@@ -357,13 +357,14 @@ double ShapeTouch::way_to(const Pose& hand) const noexcept {
          2.0 * shape_->reach() * between(hand.turn, pose_.turn).vec().norm();
 }
 
-// May a proxy without contacts go to the hand at once? Not into a surface that it has not reached.
+// May a proxy without contacts go to the hand at once? Not into a surface that it has not reached,
+// nor behind one.
 bool ShapeTouch::can_follow(const Pose& hand) noexcept {
   if (stride_ < longest_step) return false;
   if (way_to(hand) <= stride_) return true;
   Scan found;
   scan(hand, all, found, nullptr);
-  return found.inside == 0;
+  return found.inside == 0 && !(found.least < static_cast<float>(-deepest));
 }
 
 // Moves the proxy towards the hand until it rests. True if it touches.

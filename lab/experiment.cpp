@@ -17,8 +17,9 @@ namespace palpate::lab {
 // clang-format off
 #define PALPATE_EXPERIMENTS(name)                                                             \
   name(flat) name(single_lift) name(lift) name(bound) name(corners) name(scan)                \
-  name(fidelity) name(feel) name(cameras) name(zwidth) name(tool) name(turning) name(splat)   \
-  name(materials) name(teleop) name(teleop_faults) name(pop) name(field) name(visits) name(real)
+  name(fidelity) name(feel) name(cameras) name(zwidth) name(tool) name(tool_cases)            \
+  name(turning) name(splat) name(materials) name(teleop) name(teleop_faults) name(pop)        \
+  name(field) name(visits) name(real)
 // clang-format on
 
 #define PALPATE_DECLARE(name) Experiment name##_experiment();

@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tools with a shape at places where the truth is known, beside penalties of the same points.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
-#include <memory>
 #include <numbers>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "lab/experiment.hpp"
+#include "lab/experiments/tool_bench.hpp"
 #include "lab/statistics.hpp"
-#include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/tool/shape_touch.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -24,34 +19,23 @@ namespace {
 constexpr double period = 1e-3;      // [s] of a tick
 constexpr double come_down = 1.5;    // [s] above the surface and down
 constexpr double rest_from = 3.5;    // [s] from when force and noise are measured
-constexpr double rested_time = 6.0;  // [s] a case lasts,
-constexpr double coming_time = 2.6;  // [s] or so long where the surface comes
-constexpr double comes_from = 2.0;   // [s]
+constexpr double rested_time = 6.0;  // [s] a case lasts
 constexpr double above = 0.03;       // [m] where a hand begins
 constexpr double pressed = 5e-3;     // [m]
 constexpr double is_behind = 5e-3;   // [m] behind the true surface: no noise is so large
-constexpr double usual_tilt = 0.3;   // [rad] of the camera, and 1 sigma of a plate's on its axes
+constexpr double usual_tilt = 0.3;   // [rad] of the camera
 constexpr double quarter = std::numbers::pi / 4;
 
-Part part(Shape shape, const Vec3& at = Vec3::Zero(), const Vec3& turn = Vec3::Zero()) {
-  Part made;
-  made.shape = std::move(shape);
-  made.world_from_part.linear() = rotation_by(turn).toRotationMatrix();
-  made.world_from_part.translation() = at;
-  return made;
-}
-
-struct ToolCase {
+struct PressCase {
   std::string name, tool;
   std::vector<Part> parts;
   HandPose end;       // where the hand presses the tool to
   double half;        // [m] half of the tool's length
   double tilt = 0.0;  // [rad] of the camera
-  [[nodiscard]] bool is_coming() const { return name == "coming"; }  // only its side is known
   [[nodiscard]] bool is_peg() const { return name.starts_with("peg"); }
 };
 
-ToolCase box_case(const std::string& name, const Vec3& turn) {
+PressCase box_case(const std::string& name, const Vec3& turn) {
   const std::string box = "box:40x20x5mm";
   double lowest = 0.0;
   const auto shape = make_tool(box, {});
@@ -76,9 +60,9 @@ std::vector<Part> hole(double radius) {
   return parts;
 }
 
-std::vector<ToolCase> tool_cases() {
-  std::vector<ToolCase> cases{box_case("flat", {0, 0, 0}), box_case("edge", {0, 0.3, 0}),
-                              box_case("corner", {0.25, 0.3, 0})};
+std::vector<PressCase> press_cases() {
+  std::vector<PressCase> cases{box_case("flat", {0, 0, 0}), box_case("edge", {0, 0.3, 0}),
+                               box_case("corner", {0.25, 0.3, 0})};
   // Two planes of 90 degrees, across a box and along a capsule; each lies on both at its height.
   const auto valley = [](const Vec3& axis) {
     return std::vector<Part>{part(HalfSpace{}, Vec3::Zero(), quarter * axis),
@@ -97,16 +81,11 @@ std::vector<ToolCase> tool_cases() {
     cases.push_back(
         {fmt::format("peg-{}mm", clearance), "cylinder:60x20mm", hole(10e-3 + room), end, 30e-3});
   }
-  Part rising = part(HalfSpace{});
-  rising.motion = {.start = comes_from, .speed = 0.5};
-  cases.push_back(
-      {"coming", "box:60x60x5mm", {rising}, {{0, 0, above}, Rotation::Identity()}, 30e-3});
   return cases;
 }
 
-HandPose hand_at(const ToolCase& one, double t) {
+HandPose hand_at(const PressCase& one, double t) {
   HandPose hand = one.end;
-  if (one.is_coming()) return hand;
   hand.position.z() += above * std::clamp(2.0 * (1.0 - t / come_down), 0.0, 1.0);
   if (one.is_peg()) hand.position.x() *= std::clamp((t - come_down - 0.3) / 0.5, 0.0, 1.0);
   return hand;
@@ -151,96 +130,6 @@ HandPose rested(const Scene& scene, const ToolShape& shape, const HandPose& hand
   return pose;
 }
 
-constexpr double deepest = 30e-3;  // [m] what is deeper is behind something else
-
-// [m] how far a place is behind what the newest frame shows along its line of sight; below 0 in
-// front. None where nothing is known.
-std::optional<double> depth_behind(const DepthImage& image, const Vec3& place) {
-  const Intrinsics& k = image.intrinsics();
-  const Vec3 p = image.world_from_camera().inverse() * place;
-  const int u = static_cast<int>(std::lround(k.cx + k.fx * p.x() / p.z()));
-  const int v = static_cast<int>(std::lround(k.cy + k.fy * p.y() / p.z()));
-  if (u < 0 || v < 0 || u >= k.width || v >= k.height) return std::nullopt;
-  const double z = image.depth_at(u, v);
-  return z > 0.0 ? std::optional(p.z() - z) : std::nullopt;
-}
-
-// The newest frame as a field of such depths in voxels about the tool, as planners and simulators
-// have it; its gradient points into the surface.
-class VoxelField {
- public:
-  void take(const DepthImage& image, const Vec3& place, double reach) {
-    spacing_ = 2.0 * (reach + deepest) / (side - 1);
-    low_ = place - Vec3::Constant(0.5 * (side - 1) * spacing_);
-    depth_.clear();
-    for (int i = 0; i < side * side * side; ++i) {
-      const Vec3 at = low_ + spacing_ * Vec3(i % side, i / side % side, i / (side * side));
-      depth_.push_back(std::clamp(depth_behind(image, at).value_or(-deepest), -deepest, deepest));
-    }
-  }
-  // Interpolated. @return the depth, and its gradient
-  [[nodiscard]] std::pair<double, Vec3> at(const Vec3& place) const {
-    const Vec3 q = (place - low_) / spacing_;
-    std::pair<double, Vec3> found{-deepest, Vec3::Zero()};
-    if (!(q.minCoeff() >= 0.0 && q.maxCoeff() < side - 1)) return found;
-    const Eigen::Vector3i cell = q.cast<int>();
-    const Vec3 part = q - cell.cast<double>();
-    found.first = 0.0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const Eigen::Vector3i bit(corner & 1, corner >> 1 & 1, corner >> 2);
-      const Eigen::Vector3i of = cell + bit;
-      const double depth =
-          depth_[static_cast<std::size_t>((of.z() * side + of.y()) * side + of.x())];
-      const Vec3 share =
-          bit.cast<double>().cwiseProduct(2.0 * part - Vec3::Ones()) + Vec3::Ones() - part;
-      found.first += depth * share.prod();
-      for (int k = 0; k < 3; ++k)
-        found.second[k] += depth * (bit[k] ? 1.0 : -1.0) * share[(k + 1) % 3] * share[(k + 2) % 3];
-    }
-    return found;
-  }
-
- private:
-  static constexpr int side = 64;
-  double spacing_ = 0.0;  // [m]
-  Vec3 low_ = Vec3::Zero();
-  std::vector<double> depth_;  // [m]
-};
-
-// What is published more often: each point of the shell that is behind the surface pushes by its
-// depth, together as stiff as the coupling: along its inward normal, or out of a field of voxels.
-// There is no proxy.
-Tick penalty(const ToolShape& shape, const DepthImage& image, const VoxelField* voxels,
-             const HandPose& hand, double t) {
-  Tick tick = free_tick(hand.position, t, 0);
-  tick.orientation = tick.proxy_orientation = hand.orientation;
-  double depths = 0.0, squares = 0.0;
-  for (const auto& point : shape.points()) {
-    const Vec3 lever = hand.orientation * point.at;
-    double depth = 0.0;
-    Vec3 way = hand.orientation * point.inward;
-    if (voxels != nullptr) {
-      const auto [behind, gradient] = voxels->at(hand.position + lever);
-      depth = behind;
-      way = -gradient.normalized();
-    } else {
-      depth = depth_behind(image, hand.position + lever).value_or(0.0);
-    }
-    if (depth <= 0.0 || depth > deepest) continue;
-    const Vec3 force = depth * way;
-    tick.force += force;
-    tick.torque += lever.cross(force);
-    depths += depth;
-    squares += depth * depth;
-  }
-  if (depths <= 0.0) return tick;
-  // As if as many points as share the depths evenly were the springs.
-  const double share = Coupling{}.stiffness * squares / (depths * depths);
-  tick.force *= share;
-  tick.torque *= share;
-  return tick;
-}
-
 // What was felt while the hand rested, and how long the tool was behind in one go.
 struct Felt {
   std::vector<double> force, torque;  // [N] upwards, [N m] its size
@@ -248,24 +137,22 @@ struct Felt {
   double longest = 0.0;  // [s]
 };
 
-Felt play(const ToolCase& one, const ToolShape& shape, SyntheticCamera& camera, double frame_rate,
-          const Scene& scene,
-          const std::function<Tick(const Frame*, const HandPose&, double)>& tick_of) {
+Felt play(const PressCase& one, const ToolShape& shape, SyntheticCamera& camera,
+          ToolMethod& method) {
   Felt felt;
   double behind = 0.0;  // [s]
   std::uint64_t frames = 0;
   Frame frame;
-  const double duration = one.is_coming() ? coming_time : rested_time;
-  for (int i = 0; i < static_cast<int>(std::lround(duration / period)); ++i) {
+  for (int i = 0; i < static_cast<int>(std::lround(rested_time / period)); ++i) {
     const double t = i * period;
-    const double due = static_cast<double>(frames) / frame_rate;
-    const bool is_new = t >= due - 1e-9;
-    if (is_new) frame = camera.capture(due, frames++);
-    const Tick tick = tick_of(is_new ? &frame : nullptr, hand_at(one, t), t);
+    const HandPose hand = hand_at(one, t);
+    const double due = static_cast<double>(frames) / camera.setup().frame_rate;
+    if (t >= due - 1e-9) method.take(frame = camera.capture(due, frames++), hand.position);
+    const Tick tick = method.tick(hand, t);
     bool inside = false;
     for (std::size_t k = 0; k < shape.points().size() && t >= 1.0 && !inside; k += 10) {
       const Vec3 at = tick.proxy + tick.proxy_orientation * shape.points()[k].at;
-      inside = scene.signed_distance(at, t) < -is_behind;
+      inside = camera.scene().signed_distance(at, t) < -is_behind;
     }
     behind = inside ? behind + period : 0.0;
     felt.longest = std::max(felt.longest, behind);
@@ -278,37 +165,16 @@ Felt play(const ToolCase& one, const ToolShape& shape, SyntheticCamera& camera, 
   return felt;
 }
 
-std::string row_of(ToolCase one, const std::string& sensor, const std::string& method,
+std::string row_of(const PressCase& one, const std::string& sensor, std::string_view method,
                    std::uint64_t seed) {
   const Scene scene(one.parts);
   CameraSetup setup;
-  setup.world_from_camera = looking_at_origin(one.is_coming() ? 0.7 : 0.45, one.tilt, 0.0);
+  setup.world_from_camera = looking_at_origin(0.45, one.tilt, 0.0);
   SensorModel model = SensorModel::named(sensor);
   model.seed = seed;
   SyntheticCamera camera(scene, setup, model);
   const auto shape = make_tool(one.tool, {});
-  if (one.is_coming()) {
-    std::array<float, 2> drawn{};
-    fill_normal(seed, drawn);
-    one.end.orientation = rotation_by(usual_tilt * Vec3(drawn[0], drawn[1], 0.0));
-  }
-  ShapeTouch touch(shape, {});
-  std::shared_ptr<const Cloud> newest;
-  VoxelField voxels;
-  const Felt felt = play(one, *shape, camera, setup.frame_rate, scene,
-                         [&](const Frame* frame, const HandPose& hand, double t) {
-                           if (frame != nullptr) {
-                             touch.observe({*frame->cloud, frame->stamp});
-                             newest = frame->cloud;
-                             if (method == "voxels")
-                               voxels.take(*newest->image(), hand.position, shape->reach());
-                           }
-                           if (method == "shape") return touch.tick(hand, t);
-                           return penalty(*shape, *newest->image(),
-                                          method == "voxels" ? &voxels : nullptr, hand, t);
-                         });
-  if (one.is_coming())
-    return csv_row(one.name, sensor, method, seed, "", "", "", "", "", "", felt.longest);
+  const Felt felt = play(one, *shape, camera, *make_tool_method(method, shape));
   const HandPose hand = hand_at(one, rested_time);
   HandPose start = hand;
   if (one.is_peg())
@@ -328,17 +194,17 @@ std::string row_of(ToolCase one, const std::string& sensor, const std::string& m
 }
 
 std::vector<Cell> tool_cells(const Experiment& /*experiment*/, const ExperimentOptions& options) {
-  const std::vector<ToolCase> cases = tool_cases();
+  const std::vector<PressCase> cases = press_cases();
   std::vector<std::string_view> names;
-  for (const ToolCase& one : cases) names.push_back(one.name);
+  for (const PressCase& one : cases) names.push_back(one.name);
   check_families(options, "tool has no such case", names);
   std::vector<Cell> cells;
-  for (const ToolCase& one : cases) {
+  for (const PressCase& one : cases) {
     if (!options.wants(one.name)) continue;
     for (const char* sensor : {"ideal", "d4xx"}) {
-      const bool repeats = std::string_view(sensor) != "ideal" || one.is_coming();
+      const bool repeats = std::string_view(sensor) != "ideal";
       for (int i = 0; i < (repeats ? options.cases.value_or(3) : 1); ++i)
-        for (const char* method : {"shape", "penalty", "voxels"})
+        for (const std::string_view method : tool_methods)
           cells.emplace_back([=, seed = options.seed + static_cast<std::uint64_t>(i)] {
             return row_of(one, sensor, method, seed);
           });
@@ -361,19 +227,14 @@ Scores tool_scores(const Table& table) {
   };
   for (const std::size_t row : first_rows(table, key)) {
     const auto values = [&](std::string_view column) {
-      return table.numbers(column, [&](std::size_t other) {
-        return key(other) == key(row) && !table.text(other, column).empty();
-      });
+      return table.numbers(column, [&](std::size_t other) { return key(other) == key(row); });
     };
     std::vector<std::string> line{table.text(row, "case"), table.text(row, "camera"),
                                   table.text(row, "method")};
     using Shown = std::pair<std::string_view, double>;
     for (const auto& [column, unit] : {Shown{"force_error", 100.0}, Shown{"torque_error", 100.0},
                                        Shown{"force_noise", 1e3}, Shown{"torque_noise", 1e3}}) {
-      double sum = 0.0;
-      const std::vector<double> all = values(column);
-      for (const double value : all) sum += unit * value / static_cast<double>(all.size());
-      line.push_back(all.empty() ? "-" : fmt::format("{:.2f}", sum));
+      line.push_back(fmt::format("{:.2f}", unit * mean(values(column))));
     }
     const std::vector<double> behind = values("behind");
     line.push_back(fmt::format("{:.0f}", 1e3 * *std::max_element(behind.begin(), behind.end())));
@@ -387,8 +248,7 @@ Scores tool_scores(const Table& table) {
 Experiment tool_experiment() {
   return {
       .name = "tool",
-      .summary =
-          "tools with a shape against the truth: force, torque, noise, side; beside penalties",
+      .summary = "tools with a shape against the truth: force, torque, noise; beside penalties",
       .header =
           "case,camera,method,seed,force,torque,force_error,torque_error,force_noise,torque_noise,"
           "behind",

@@ -162,9 +162,19 @@ def _cases(rows, panels, group, *columns, **labels):
 
 
 def _tool(rows, panels):
-    _cases([row for row in rows if row["torque_error"]], panels,
-           lambda row: f"{row['case']} {row['camera']}", "force_error", "torque_error",
-           xscale="log", xlim=(1e-4, 10))
+    _cases(rows, panels, lambda row: f"{row['case']} {row['camera']}", "force_error",
+           "torque_error", xscale="log", xlim=(1e-4, 10))
+
+
+def _tool_cases(rows, panels):
+    """Cases that were behind, and for how long at most, by family."""
+    share, longest = panels(2, 2)
+    family = lambda row: row["family"]
+    cases = lambda own: sum(_numbers(own, "cases"))
+    _groups(share, rows, family, lambda own: 100.0 * sum(_numbers(own, "behind")) / cases(own),
+            xlabel="behind for 0.1 s [%]", xlim=(-2, 102))
+    _groups(longest, rows, family, lambda own: max(_numbers(own, "longest")),
+            xlabel="longest behind [s]")
 
 
 def _turning(rows, panels):
@@ -270,9 +280,10 @@ def _trace(rows, panels):
 
 FIGURES = {"flat": _flat, "single-lift": _single_lift, "lift": _lift, "bound": _bound,
            "corners": _corners, "scan": _scan, "fidelity": _aims, "feel": _aims,
-           "cameras": _cameras, "zwidth": _zwidth, "tool": _tool, "turning": _turning,
-           "materials": _materials, "teleop": _teleop, "teleop-faults": _teleop_faults, "pop": _held, "field": _right,
-           "visits": _right, "real": _real, "splat": _splat, "growth": _growth}
+           "cameras": _cameras, "zwidth": _zwidth, "tool": _tool, "tool-cases": _tool_cases,
+           "turning": _turning, "materials": _materials, "teleop": _teleop,
+           "teleop-faults": _teleop_faults, "pop": _held, "field": _right, "visits": _right,
+           "real": _real, "splat": _splat, "growth": _growth}
 
 
 def draw(file):

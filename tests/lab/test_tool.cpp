@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The experiment `tool`: the shape is where the truth is, and a penalty is not.
+// The experiments of tools: the shape is where the truth is, and a penalty is not.
+#include <algorithm>
+#include <cstdint>
+
 #include <gtest/gtest.h>
 
 #include "lab/experiment.hpp"
+#include "lab/experiments/tool_cases.hpp"
 #include "lab/runner.hpp"
 
 #include "tests/support/errors.hpp"
@@ -11,10 +15,10 @@
 namespace palpate::lab {
 namespace test_tool {
 
-Table run_of(const std::string& name, const std::string& experiment = "tool") {
+Table run_of(const std::string& name, const std::string& experiment = "tool", int cases = 1) {
   ExperimentOptions options;
   options.families = {name};
-  options.cases = 1;
+  options.cases = cases;
   RunnerOptions runner;
   runner.jobs = 2;
   const test::TemporaryFolder folder;
@@ -49,14 +53,48 @@ TEST(ToolExperiment, ABoxThatLiesFlatHasTheTrueForceAndAPenaltyHasNot) {
   EXPECT_EQ(scores.rows[0].size(), scores.columns.size());
 }
 
-TEST(ToolExperiment, APlateStaysBeforeASurfaceThatComesAndAPenaltyDoesNot) {
-  const Table table = run_of("coming");
-  for (const char* camera : {"ideal", "d4xx"}) {
-    EXPECT_LT(value(table, camera, "shape", "behind"), 0.1) << camera;
-    EXPECT_GT(value(table, camera, "penalty", "behind"), 0.3) << camera;
-    EXPECT_GT(value(table, camera, "voxels", "behind"), 0.3) << camera;
+TEST(ToolCases, BeginAndStayOutsideOfWhatTheyTouchAndArePressed) {
+  for (const std::string_view family : tool_families) {
+    int pressed = 0, free = 0;
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      const ToolCase one = draw_tool_case(family, seed);
+      const Scene bodies(one.bodies);
+      const HipPath hand(one.hand);
+      EXPECT_GT(clearance(bodies, *one.tool, hand.pose_at(0.0), 0.0), 5e-3) << family << seed;
+      EXPECT_EQ(hand.pose_at(0.2).position, hand.pose_at(0.0).position) << "frames come first";
+      double deepest = 0.0;
+      for (double t = 0.0; t < one.ends; t += 10e-3) {
+        const double gap = clearance(bodies, *one.tool, hand.pose_at(t), t);
+        deepest = std::min(deepest, gap);
+        free += gap > 3.0 * one.sigma ? 1 : 0;
+      }
+      pressed += deepest < -1.9e-3 ? 1 : 0;
+    }
+    EXPECT_EQ(pressed, 5) << family;
+    EXPECT_GT(free, 20) << family;
   }
-  EXPECT_EQ(find_experiment("tool").scores(table).rows[0][3], "-") << "no truth of forces there";
+}
+
+TEST(ToolCases, AToolStaysBeforeASurfaceThatComesAndAPenaltyDoesNot) {
+  const Table table = run_of("coming", "tool-cases", 2);
+  ASSERT_EQ(table.rows(), 3U);
+  EXPECT_LT(table.number(0, "longest"), 0.1);
+  EXPECT_EQ(table.number(0, "behind"), 0.0);
+  for (const std::size_t peer : {1U, 2U}) {
+    EXPECT_GT(table.number(peer, "longest"), 0.3) << table.text(peer, "method");
+    EXPECT_EQ(table.number(peer, "behind"), 2.0);
+    EXPECT_EQ(table.text(peer, "seeds"), "1 2");
+  }
+  const Scores scores = find_experiment("tool-cases").scores(table);
+  ASSERT_EQ(scores.rows.size(), 3U);
+  EXPECT_EQ(scores.rows[0].size(), scores.columns.size());
+}
+
+TEST(ToolCases, LiftedToolsAreNotPulled) {
+  const Table table = run_of("lifting", "tool-cases", 1);
+  EXPECT_EQ(table.number(0, "lifts"), 8.0);
+  EXPECT_EQ(table.number(0, "pulled"), 0.0);
+  EXPECT_EQ(table.number(0, "behind"), 0.0);
 }
 
 TEST(ToolExperiment, ALongToolBetweenLightFingersRestsBelowAStiffnessInRotation) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/tool/least_motion.hpp"
 #include "palpate/kernel/tool/tool_shape.hpp"
 
@@ -70,6 +71,34 @@ TEST(ToolShape, HasItsNormalsInwards) {
     EXPECT_NEAR((point.at - axis).norm(), 4e-3, 2e-5);
     EXPECT_LT(point.inward.dot((point.at - axis).normalized()), -0.9);
   }
+}
+
+TEST(ToolShape, IsThickerByItsMargin) {
+  const Vec3 half(20e-3, 10e-3, 2.5e-3);
+  const auto box = made("box:40x20x5mm?margin=2mm");
+  for (const auto& point : box->points()) {
+    // To the box: the margin at a face, half of it at least to the planes of an edge.
+    const Vec3 beyond = point.at.cwiseAbs() - half;
+    EXPECT_NEAR(beyond.cwiseMax(0.0).norm(), 2e-3, 1e-9);
+    EXPECT_GT(beyond.maxCoeff(), 1e-3);
+  }
+  EXPECT_NEAR(box->reach(), made("box:40x20x5mm")->reach() + 2e-3, 1e-3);
+  EXPECT_EQ(box->surface().points.size(), made("box:40x20x5mm")->surface().points.size());
+}
+
+TEST(ToolShape, IsTurnedWithAllOfIt) {
+  const auto box = made("box:40x20x5mm");
+  const Rotation turn = rotation_by({0.3, -1.0, 2.0});
+  const ToolShape turned = box->turned(turn);
+  ASSERT_EQ(turned.points().size(), box->points().size());
+  for (std::size_t i = 0; i < turned.points().size(); ++i) {
+    EXPECT_LT((turned.points()[i].at - turn * box->points()[i].at).norm(), 1e-12);
+    EXPECT_LT((turned.points()[i].inward - turn * box->points()[i].inward).norm(), 1e-12);
+    EXPECT_EQ(turned.points()[i].patch, box->points()[i].patch);
+  }
+  EXPECT_LT((turned.surface().points[3] - turn * box->surface().points[3]).norm(), 1e-12);
+  EXPECT_EQ(turned.text(), box->text());
+  EXPECT_EQ(turned.reach(), box->reach());
 }
 
 TEST(ToolShape, GivesABallToOtherMethods) { EXPECT_EQ(made("ball"), nullptr); }

@@ -8,6 +8,11 @@
 
 namespace palpate {
 
+bool is_rotation(const Rotation& q) noexcept {
+  constexpr double digits = 0.01;            // [-] of the length, where somebody wrote few
+  return std::abs(q.norm() - 1.0) < digits;  // false if it is no number
+}
+
 Rotation unit(const Rotation& q) noexcept {
   const double length = std::sqrt(q.x() * q.x() + q.y() * q.y() + q.z() * q.z() + q.w() * q.w());
   return {q.w() / length, q.x() / length, q.y() / length, q.z() / length};

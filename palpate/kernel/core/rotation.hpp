@@ -6,6 +6,8 @@
 
 namespace palpate {
 
+/// Can it be a rotation? It is finite, and of length 1 to within 1 %.
+bool is_rotation(const Rotation& q) noexcept;
 /// The same, of length 1.
 Rotation unit(const Rotation& q) noexcept;
 /// The rotation by b, and then by a.

@@ -206,7 +206,8 @@ Triangles mesh_of(const std::string& text, const Uri& uri, const MeshReader& rea
 
 }  // namespace
 
-ToolShape::ToolShape(const Triangles& surface, std::size_t count, std::string text, double turning)
+ToolShape::ToolShape(const Triangles& surface, std::size_t count, std::string text, double turning,
+                     double margin)
     : surface_(surface), text_(std::move(text)), turning_(turning) {
   if (count < 4 || count > most_points)
     refuse(text_, std::to_string(count) + " points are not between 4 and 10000");
@@ -255,6 +256,7 @@ ToolShape::ToolShape(const Triangles& surface, std::size_t count, std::string te
     if (!points_.empty() && away[i] > away[next]) next = i;
   }
   take(every, count, next);
+  for (Point& point : points_) point.at -= margin * point.inward;
   finish();
 }
 
@@ -268,6 +270,16 @@ ToolShape::ToolShape(std::vector<Point> points, std::string text, double turning
     if (!point.at.allFinite() || !point.inward.allFinite() || point.at.norm() > longest)
       refuse(text_, "a point is not finite");
   finish();
+}
+
+ToolShape ToolShape::turned(const Rotation& turn) const {
+  ToolShape tool = *this;
+  for (Point& point : tool.points_) {
+    point.at = turn * point.at;
+    point.inward = turn * point.inward;
+  }
+  for (Vec3& point : tool.surface_.points) point = turn * point;
+  return tool;
 }
 
 void ToolShape::finish() {
@@ -297,10 +309,11 @@ std::shared_ptr<const ToolShape> make_tool(std::string_view given, const MeshRea
   const auto lengths = [&](std::size_t n) { return lengths_of(text, uri.path(), n); };
   Triangles surface;
   if (kind == "mesh") {
-    uri.allow_only(std::array<std::string_view, 4>{"points", "turning", "unit", "origin"});
+    uri.allow_only(
+        std::array<std::string_view, 5>{"points", "turning", "margin", "unit", "origin"});
     surface = mesh_of(text, uri, read);
   } else {
-    uri.allow_only(std::array<std::string_view, 2>{"points", "turning"});
+    uri.allow_only(std::array<std::string_view, 3>{"points", "turning", "margin"});
   }
   if (kind == "box") {
     std::vector<double> sides = lengths(3);
@@ -325,7 +338,8 @@ std::shared_ptr<const ToolShape> make_tool(std::string_view given, const MeshRea
     refuse(text, "'" + kind + "' is no tool");
   }
   return std::make_shared<const ToolShape>(
-      surface, count, text, uri.number_option("turning", ToolShape::usual_turning, 0.01, 1e3, ""));
+      surface, count, text, uri.number_option("turning", ToolShape::usual_turning, 0.01, 1e3, ""),
+      uri.number_option("margin", 0.0, 0.0, 0.05, "m"));
 }
 
 }  // namespace palpate

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/core/hand.hpp"
 
 namespace palpate {
 
@@ -40,12 +40,16 @@ class ToolShape {
   /// Samples a surface with at most `count` points: its corners and edges first. O(count^2).
   /// @param text  the specification, as in `text()`
   /// @param turning  as in `turn_length`
+  /// @param margin  [m] by which the points lie outside of the surface
   /// @throws Error if the surface has no area, or count is not in 4..most_points
   ToolShape(const Triangles& surface, std::size_t count, std::string text,
-            double turning = usual_turning);
+            double turning = usual_turning, double margin = 0.0);
   /// The same from points as `points()` gave them; their patches are found again.
   /// @throws Error if there are none or too many, or a number is not finite
   ToolShape(std::vector<Point> points, std::string text, double turning);
+
+  /// The same tool, held in the hand by another side.
+  [[nodiscard]] ToolShape turned(const Rotation& turn) const;
 
   [[nodiscard]] const std::vector<Point>& points() const noexcept { return points_; }
   /// What was sampled, for drawing; empty if it was made from points.
@@ -87,7 +91,8 @@ using MeshReader = std::function<Triangles(const std::string& file)>;
 ///                               default) or origin=file
 ///
 /// Lengths have one unit behind the last: mm, cm or m. All take the options
-/// points=N, and turning=X of 0.01 to 1000: see ToolShape::turning.
+/// points=N, turning=X of 0.01 to 1000 (see ToolShape::turning), and margin=M [m]: it touches with
+/// a surface that lies so far outside of its own.
 /// @throws Error saying what was wrong
 std::shared_ptr<const ToolShape> make_tool(std::string_view text, const MeshReader& read);
 

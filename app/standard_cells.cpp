@@ -19,8 +19,8 @@ Cell open_scene(const std::string& uri) {
   struct Shared final : Robot {
     explicit Shared(std::shared_ptr<SceneRobot> one) : robot(std::move(one)) {}
     [[nodiscard]] const RobotInfo& info() const override { return robot->info(); }
-    void command(const Vec3& position, const Vec3& velocity, double t) noexcept override {
-      robot->command(position, velocity, t);
+    void command(const HandPose& pose, const Vec3& velocity, double t) noexcept override {
+      robot->command(pose, velocity, t);
     }
     [[nodiscard]] std::optional<RobotState> state() override { return robot->state(); }
     std::shared_ptr<SceneRobot> robot;

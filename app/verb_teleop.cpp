@@ -112,6 +112,7 @@ int guard(const RobotOptions& options) {
   RobotEndOptions wishes = options.end;
   if (!config.fixtures.empty())
     wishes.fixtures = std::make_shared<const FixtureSet>(read_fixtures(config.fixtures));
+  wishes.tool = config.tool;
   RobotEnd end(cell.robot(), wishes);
   run.in_real_time = true;
   run.beside.prepare = [&](SessionOptions& session) {
@@ -181,6 +182,8 @@ int lead_here(const OperatorOptions& operating, const RobotOptions& robot) {
   std::vector<std::string> words = {"teleop", "robot",        "--robot",      robot.robot,
                                     "--name", operating.name, "--no-browser", "--beside"};
   if (operating.run.headless) words.emplace_back("--headless");
+  if (const std::string tool = operating.run.session.config(session_methods()).tool; !tool.empty())
+    words.insert(words.end(), {"--tool", tool});
   const double seconds =
       operating.run.duration.value_or(operating.run.headless ? headless_duration : 0.0);
   if (seconds > 0.0) {

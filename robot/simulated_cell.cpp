@@ -63,8 +63,8 @@ class SimulatedRobot final : public Robot {
     info_.uri = uri;
   }
   [[nodiscard]] const RobotInfo& info() const override { return info_; }
-  void command(const Vec3& position, const Vec3& velocity, double /*t*/) noexcept override {
-    simulation_->command(position, velocity);
+  void command(const HandPose& pose, const Vec3& velocity, double /*t*/) noexcept override {
+    simulation_->command(pose.position, velocity);
   }
   [[nodiscard]] std::optional<RobotState> state() override { return simulation_->state(); }
 

@@ -122,7 +122,7 @@ TEST(SimulatedCell, GivesARobotAndACameraOfOneSimulation) {
   const auto robot = cell.robot();
   EXPECT_EQ(robot->info().uri, "mujoco:desk?size=320x240");
   EXPECT_EQ(robot->info().kind, "simulated arm");
-  robot->command({0.0, 0.0, 0.10}, Vec3::Zero(), 0.0);
+  robot->command({Vec3(0.0, 0.0, 0.10)}, Vec3::Zero(), 0.0);
   const auto camera = cell.camera();
   ASSERT_TRUE(camera->next());
   ASSERT_TRUE(camera->next());  // advances to 1/30 s

@@ -3,10 +3,13 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/net/teleop/led_hand.hpp"
 
@@ -16,6 +19,8 @@ namespace palpate {
 namespace test_led_hand {
 
 constexpr double tick = 1e-3;  // [s]
+
+double angle(const Rotation& a, const Rotation& b) { return rotation_vector(between(a, b)).norm(); }
 
 ServoTick held_at(const Vec3& place) {
   ServoTick record;
@@ -71,24 +76,47 @@ TEST(Lead, StaysOutOfForbiddenRegions) {
   EXPECT_NEAR(record.place.z(), 0.0, 1e-6);
 }
 
+TEST(Lead, TurnsAsTheHandleDoesInTheWorldAndNotAtAllWithoutAnOrientation) {
+  ServoTick record = held_at(Vec3::Zero());
+  const Rotation world_from_device = rotation_by({0.3, -0.2, 1.0});
+  record.tick.orientation = record.tick.proxy_orientation = world_from_device;
+  EXPECT_LT(angle(lead_of(record).turn, Rotation::Identity()), 1e-9);
+  record.handle = rotation_by({0.5, 0.0, 0.0});
+  record.tick.orientation = product(world_from_device, record.handle);
+  // The proxy was held back by a surface.
+  const Rotation turn = rotation_by({0.0, 0.0, 0.4});
+  record.tick.proxy_orientation = product(turn, world_from_device);
+  EXPECT_LT(angle(lead_of(record).turn, turn), 1e-9);
+  EXPECT_TRUE(lead_of(record).leads);
+  record.tick.proxy_orientation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(lead_of(record).leads);
+}
+
 class LedHandTest : public ::testing::Test {
  protected:
-  // Reads for so long, led or not; the tool follows at once. @return the largest speed [m/s]
-  double go(LedHand& hand, double seconds, const std::optional<Vec3>& to) {
+  // Reads for so long, led or not; the tool follows at once. @return the largest speed [m/s], of a
+  // point 0.2 m from its centre as far as it turns
+  double go(LedHand& hand, double seconds, const std::optional<Vec3>& to,
+            const Rotation& turn = Rotation::Identity()) {
     double fastest = 0.0;
     for (const double end = t_ + seconds; t_ < end; t_ += tick) {
-      if (to) hand.lead({.place = *to, .leads = true}, t_);
+      if (to) hand.lead({.place = *to, .turn = turn, .leads = true}, t_);
       const Vec3 before = at_;
-      at_ = hand.read(t_).position;
-      hand.tool_is_at(tool_.value_or(at_));
-      fastest = std::max(fastest, (at_ - before).norm() / tick);
+      const Rotation was = turn_;
+      const HandState state = hand.read(t_);
+      at_ = state.position;
+      turn_ = Rotation(state.orientation.value());
+      hand.tool_is_at(tool_.value_or(at_), tool_turn_.value_or(turn_));
+      fastest = std::max(fastest, ((at_ - before).norm() + 0.2 * angle(turn_, was)) / tick);
     }
     return fastest;
   }
 
   double t_ = 100.0;
   Vec3 at_ = Vec3::Zero();
-  std::optional<Vec3> tool_;  // where it is said to be; none: at the hand
+  Rotation turn_ = Rotation::Identity();
+  std::optional<Vec3> tool_;           // where it is said to be; none: at the hand
+  std::optional<Rotation> tool_turn_;  // likewise
 };
 
 // Hazard: robot-runaway
@@ -143,6 +171,72 @@ TEST_F(LedHandTest, IsNotLedWhileNothingIsSeenOrByWhatIsNoPlace) {
   EXPECT_EQ(at_, before);
   hand.tool_is_at(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
   EXPECT_TRUE(hand.read(t_).position.allFinite());
+}
+
+// Hazard: robot-runaway
+TEST_F(LedHandTest, TurnsNoFasterThanItsFarthestPointMayMove) {
+  LedHand hand(Vec3::Zero(),
+               {.max_speed = 0.2, .contact_speed = 0.05, .lever = 0.2, .resume_time = 0.5});
+  const Rotation turn = rotation_by({0.0, 0.0, 3.0});
+  EXPECT_LT(go(hand, 0.05, Vec3::Zero(), turn), 0.03);
+  EXPECT_NEAR(go(hand, 1.0, Vec3::Zero(), turn), 0.2, 1e-6);
+  hand.clearance(0.0);
+  EXPECT_NEAR(go(hand, 0.2, Vec3::Zero(), turn), 0.05, 1e-6);
+  hand.clearance(1.0);
+  // With a way to go, both arrive together.
+  const Vec3 to(0.1, 0.0, 0.0);
+  const double left = angle(turn, turn_);
+  EXPECT_NEAR(go(hand, 0.5, to, turn), 0.2, 1e-6);
+  EXPECT_NEAR((to - at_).norm() / 0.1, angle(turn, turn_) / left, 1e-6);
+  EXPECT_LT((to - at_).norm(), 0.09);
+  go(hand, 5.0, to, turn);
+  EXPECT_EQ(at_, to);
+  EXPECT_LT(angle(turn_, turn), 1e-9);
+}
+
+// Hazard: robot-runaway
+TEST_F(LedHandTest, HoldsTheToolsOrientationWithoutALeadAndComesBackSlowly) {
+  LedHand hand(Vec3::Zero(), {.silence = 0.05, .resume_time = 0.5});
+  const Rotation turn = rotation_by({2.0, 0.0, 0.0});
+  go(hand, 0.8, Vec3::Zero(), turn);
+  tool_turn_ = rotation_by({0.5, 0.0, 0.0});  // it is late
+  ASSERT_GT(angle(turn_, *tool_turn_), 0.05);
+  go(hand, 0.06, std::nullopt);
+  EXPECT_FALSE(hand.is_led());
+  EXPECT_LT(angle(turn_, *tool_turn_), 1e-9);
+  tool_turn_ = rotation_by({0.0, 1.0, 0.0});  // by what pushes it
+  go(hand, 1.0, std::nullopt);
+  EXPECT_LT(angle(turn_, rotation_by({0.5, 0.0, 0.0})), 1e-9);
+  EXPECT_LT(go(hand, 0.05, Vec3::Zero(), turn), 0.25 * 0.2 / 0.1 * 0.11);
+}
+
+// Hazard: robot-runaway
+TEST_F(LedHandTest, RestsWhereAnOrientationIsNone) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Rotation& bad : {Rotation(1.0, nan, 0.0, 0.0), Rotation(0.0, 0.0, 0.0, 0.0),
+                              Rotation(1.0, 1.0, 0.0, 0.0), Rotation(1e200, 0.0, 0.0, 0.0)}) {
+    LedHand hand(Vec3::Zero(), {});
+    go(hand, 0.3, Vec3(0.1, 0.0, 0.0), rotation_by({1.0, 0.0, 0.0}));
+    EXPECT_TRUE(hand.is_led());
+    const Vec3 before = at_;
+    const Rotation was = turn_;
+    hand.tool_is_at(at_, bad);
+    go(hand, 0.3, Vec3(0.1, 0.0, 0.0), bad);
+    EXPECT_FALSE(hand.is_led());
+    EXPECT_LT((at_ - before).norm(), 1e-9);
+    EXPECT_LT(angle(turn_, was), 1e-9);
+    EXPECT_THROW(LedHand(Vec3::Zero(), {}, bad), Error);
+    turn_ = Rotation::Identity();
+  }
+}
+
+TEST_F(LedHandTest, TurnsNoToolOfARobotThatDoesNot) {
+  const Rotation found = rotation_by({0.0, 1.0, 0.0});
+  LedHand hand(Vec3::Zero(), {.turns = false}, found);
+  go(hand, 1.0, Vec3(0.1, 0.0, 0.0), rotation_by({1.0, 0.0, 0.0}));
+  tool_turn_ = rotation_by({0.0, 0.0, 1.0});
+  go(hand, 0.5, std::nullopt);
+  EXPECT_LT(angle(turn_, found), 1e-9);
 }
 
 TEST_F(LedHandTest, GoesWhereRegionsKeepTheProxy) {

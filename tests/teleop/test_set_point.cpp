@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/net/teleop/approach_watch.hpp"
 #include "palpate/net/teleop/robot.hpp"
 #include "palpate/net/teleop/set_point.hpp"
@@ -190,6 +191,33 @@ TEST_F(SetPointTest, GoesOutOfTheWayOfNothingIntoWhatIsTouched) {
   EXPECT_GT(out.position.z(), 5e-3);
   // It is out of the way at once, and comes back slowly.
   EXPECT_GT(run(point, record, 0.02).position.z(), out.position.z() - 0.002);
+}
+
+// Hazard: robot-runaway
+TEST_F(SetPointTest, TurnsAsTheProxyAtTheSpeedOfItsFarthestPoint) {
+  SetPoint point({.lever = 0.2, .max_speed = 0.5, .contact_speed = 0.05});
+  ServoTick record = at(Vec3::Zero(), true, t_);
+  const auto angle = [](const Rotation& a) { return rotation_vector(a).norm(); };
+  EXPECT_EQ(angle(run(point, record, 0.1).orientation), 0.0);
+  record.tick.proxy_orientation = rotation_by({1.0, 0.0, 0.0});
+  const Rotation turned = run(point, record, 0.2).orientation;
+  EXPECT_NEAR(angle(turned), 0.05 / 0.2 * 0.2, 1e-3);
+  // A proxy that is none holds it.
+  record.tick.proxy_orientation.w() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NEAR(angle(between(run(point, record, 1.0).orientation, turned)), 0.0, 1e-9);
+  // In the open it is faster, no more than the robot.
+  record.tick.proxy_orientation = rotation_by({3.0, 0.0, 0.0});
+  record.tick.state = ContactState::free_motion;
+  run(point, record, 0.45);
+  const double before = angle(run(point, record, tick).orientation);
+  EXPECT_NEAR(angle(run(point, record, 0.1).orientation) - before, 0.5 / 0.2 * 0.1, 0.01);
+  // A stop takes the tool's orientation at once.
+  EXPECT_NEAR(angle(point
+                        .next(with_proxy_at(Vec3::Zero(), at(Vec3::Zero(), false, t_),
+                                            rotation_by({0.1, 0.0, 0.0})),
+                              Vec3::Zero(), false, {}, Vec3::Zero())
+                        .orientation),
+              0.1, 1e-9);
 }
 
 // Hazard: robot-collides

@@ -12,6 +12,8 @@
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
+#include "palpate/kernel/tool/tool_shape.hpp"
 #include "palpate/net/telelink/touched_paint.hpp"
 #include "palpate/net/teleop/led_hand.hpp"
 
@@ -70,6 +72,7 @@ void OperatorEnd::run() {
       if (now < look_due) continue;
       look_due = now + look_interval;
       follow_latency();
+      turn_shape();
     } catch (
         const std::exception& error) {  // the session continues; what is not sent stops a robot
       const std::lock_guard lock(mutex_);
@@ -83,7 +86,7 @@ void OperatorEnd::send(double now) {
   bool any = false;
   while (ticks_.try_pop(tick_)) any = true;
   if (!any) return;  // nothing renders: nothing leads
-  const Lead lead = lead_of(tick_);
+  Lead lead = lead_of(tick_);
   {
     const std::lock_guard lock(mutex_);
     view_.led = lead.leads && !index_;
@@ -95,17 +98,21 @@ void OperatorEnd::send(double now) {
   }
   const ros::Header header{dds::stamp_of(now), "world"};
   presses_.write(ros::WrenchStamped{header, components(lead.press), {}});
-  places_.write(ros::PoseStamped{header, components(lead.place)});
+  lead.turn = product(lead.turn, begin_);
+  places_.write(pose_of(header, lead.place, lead.turn));
 }
 
-// The device's place in the world moves so that the hand is where the tool is.
+// The device's place in the world moves so that the hand is where the tool is, and what the tool is
+// turned by now belongs to the handle's present orientation.
 void OperatorEnd::bring_to_hand() {
   std::optional<RobotState> state;
   {
     const std::lock_guard lock(mutex_);
     state = view_.state;
   }
-  if (!state) return;
+  if (!state || !found_) return;
+  begin_ = product(between(Rotation::Identity(), lead_of(tick_).turn),
+                   between(state->orientation, *found_));
   const Vec3 way = state->position - tick_.tick.hip;
   session_.change(
       [&](ServoSettings& settings) { settings.placement.world_from_device.pretranslate(way); });
@@ -118,11 +125,15 @@ void OperatorEnd::hear(double now) {
   const std::lock_guard lock(mutex_);
   while (const auto tool = hears_.tool.take_whole<ros::PoseStamped>()) {
     const Vec3 position(tool->position[0], tool->position[1], tool->position[2]);
-    if (!is_place(position)) continue;
+    const Rotation orientation = orientation_of(*tool);
+    if (!is_place(position) || !is_rotation(orientation)) continue;
     if (!view_.state) view_.state.emplace();
     view_.state->position = position;
+    view_.state->orientation = unit(orientation);
     view_.state->t = now;
   }
+  while (const auto found = hears_.found.take_whole<ros::PoseStamped>())
+    if (const Rotation q = orientation_of(*found); is_rotation(q)) found_ = unit(q);
   if (!view_.state) return;
   while (const auto twist = hears_.twist.take_whole<ros::TwistStamped>())
     view_.state->velocity = Vec3(twist->linear[0], twist->linear[1], twist->linear[2]);
@@ -160,6 +171,22 @@ void OperatorEnd::use_regions(const std::string& json) {
     }
     settings.fixtures = std::make_shared<const FixtureSet>(all);
   });
+}
+
+// The tool is turned in the hand: what is felt is turned as the robot's, whose frame is not the
+// handle's.
+void OperatorEnd::turn_shape() {
+  const ServoSettings now = session_.settings();
+  if (!found_ || index_ || !now.tool) return;
+  const Rotation world_from_device(now.placement.world_from_device.linear());
+  const Rotation device_from_tool =
+      product(between(Rotation::Identity(), world_from_device), product(begin_, *found_));
+  const bool is_ours = now.tool == turned_tool_;
+  if (is_ours && device_from_tool.coeffs() == device_from_tool_.coeffs()) return;
+  if (!is_ours) given_tool_ = now.tool;
+  device_from_tool_ = device_from_tool;
+  turned_tool_ = std::make_shared<const ToolShape>(given_tool_->turned(device_from_tool));
+  session_.change([&](ServoSettings& settings) { settings.tool = turned_tool_; });
 }
 
 void OperatorEnd::follow_latency() {

@@ -18,7 +18,8 @@ namespace palpate {
 /// Options of the operator's end.
 struct OperatorEndOptions {
   std::string name = "robot";  ///< of the robot's topics
-  /// The scene is shifted at the start, so that the device starts at the tool.
+  /// The scene is shifted at the start, so that the device starts at the tool, whatever its
+  /// handle's orientation is.
   bool index = true;
   /// Stiffness and friction measured by the robot become the material of the surface there; see
   /// paint_touched.
@@ -36,9 +37,10 @@ struct RobotView {
   std::string ignored;              ///< why the measurement was ignored; empty: it was used
 };
 
-/// The operator's end: sends the proxy position of a session to the robot, and adds the robot's
+/// The operator's end: sends the proxy's pose in a session to the robot, and adds the robot's
 /// limits to the session as fixtures. The session's first camera is the robot's,
-/// `ros2:/NAME/depth/image_raw/slices`.
+/// `ros2:/NAME/depth/image_raw/slices`. A tool with a shape is given as the robot's end has it, and
+/// is held in the hand so that it is turned as the robot's.
 ///
 /// Nothing is sent without a valid command (lead_of), so that a robot stops with its operator in
 /// any failure. The network latency alone does not fade the force: the age limits follow it
@@ -60,6 +62,7 @@ class OperatorEnd {
   void hear(double now);
   void use_regions(const std::string& json);
   void follow_latency();
+  void turn_shape();
 
   Session& session_;
   const std::string name_;
@@ -68,6 +71,11 @@ class OperatorEnd {
   TickRing<ServoTick>::Reader ticks_;
   ServoTick tick_;
   const SafetyParameters given_;
+  // From the handle to what the tool is to turn by: of the thread.
+  Rotation begin_ = Rotation::Identity();
+  std::optional<Rotation> found_;  // world_from_tool, when the robot's end began
+  std::shared_ptr<const ToolShape> given_tool_, turned_tool_;
+  Rotation device_from_tool_ = Rotation::Identity();  // by which that was turned
   double followed_ = 0.0;  // [s] the latency that the session's limits are for
   mutable std::mutex mutex_;
   RobotView view_;  // guarded by it

@@ -9,6 +9,7 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
+#include "palpate/io/sources/tool_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/telelink/touched_paint.hpp"
@@ -66,16 +67,34 @@ RobotState first_of(Robot& robot) {
   }
 }
 
-LeadLimits limits_of(const RobotInfo& info) {
+// [m] The farthest point of the tool with its margin; 0 of a ball.
+double reach_of(const RobotInfo& info, const RobotEndOptions& options) {
+  const auto tool = options.tool.empty() ? nullptr : read_tool(options.tool);
+  if (!tool) return 0.0;
+  if (!info.turns)
+    throw Error("tool '" + options.tool + "'", info.uri + " does not turn its tool",
+                "leave out --tool, or use a robot that turns, such as ros2:?...&turns");
+  return tool->reach() + options.margin;
+}
+
+// [m] As LeadLimits::lever.
+double lever_of(double reach) { return std::max(LeadLimits{}.lever, reach); }
+
+LeadLimits limits_of(const RobotInfo& info, double reach) {
   LeadLimits limits;
+  limits.lever = lever_of(reach);
+  limits.turns = info.turns;
   limits.max_speed = std::min(limits.max_speed, info.max_speed);
   limits.reach = info.reach;
   return limits;
 }
 
-SetPointOptions set_point_of(const RobotInfo& info, const RobotEndOptions& options,
+SetPointOptions set_point_of(const RobotInfo& info, const RobotEndOptions& options, double reach,
                              const std::shared_ptr<const FixtureSet>& regions) {
   return {.tool_radius = info.tool_radius,
+          .tool_reach = reach,
+          .turns = info.turns,
+          .lever = lever_of(reach),
           .margin = options.margin,
           .lag = info.lag,
           .stiffness = info.stiffness,
@@ -92,8 +111,10 @@ RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
       state_(first_of(*robot_)),
       regions_(regions_of(robot_->info(), options.fixtures)),
       options_(options),
-      hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info()))),
-      step_(*hand_, set_point_of(robot_->info(), options, regions_)),
+      tool_reach_(reach_of(robot_->info(), options)),
+      hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info(), tool_reach_),
+                                      state_.orientation)),
+      step_(*hand_, set_point_of(robot_->info(), options, tool_reach_, regions_)),
       publisher_(options.name, options.packing),
       participant_("teleop"),
       places_(participant_, teleop_topic(options.name, "place"), ros::PoseStamped{}, newest_alone),
@@ -103,6 +124,8 @@ RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
       learner_(robot_->info().tool_radius) {
   says_.regions.write(ros::String{fixtures_json(*regions_)});
   says_.fault.write(ros::String{""});
+  says_.found.write(
+      pose_of({dds::stamp_of(monotonic_now()), "world"}, state_.position, state_.orientation));
 }
 RobotEnd::~RobotEnd() { detach(); }
 
@@ -110,6 +133,10 @@ void RobotEnd::prepare(SessionOptions& options) const {
   options.open_devices.at(0) = std::make_unique<Borrowed>(hand_);
   set_parameter(options.parameters, "r_c", robot_->info().tool_radius + options_.margin);
   options.fixture_set = robot_fixtures(*regions_);
+  options.tool = options_.tool;
+  if (tool_reach_ > 0.0)
+    options.tool += (options.tool.find('?') == std::string::npos ? "?margin=" : "&margin=") +
+                    number_text(options_.margin) + "m";
 }
 
 void RobotEnd::on_frame(std::size_t camera, const FedFrame& fed) {
@@ -170,6 +197,7 @@ void RobotEnd::hear(double now) {
     if (stamp <= heard_ && stamp > heard_ - anew) continue;
     heard_ = stamp;
     lead_.place = Vec3(place->position[0], place->position[1], place->position[2]);
+    lead_.turn = orientation_of(*place);
     any = true;
   }
   if (!any) return;
@@ -179,7 +207,7 @@ void RobotEnd::hear(double now) {
 
 void RobotEnd::order(double now) {
   if (std::optional<RobotState> state = robot_->state()) {
-    hand_->tool_is_at(state->position);
+    hand_->tool_is_at(state->position, state->orientation);
     const std::lock_guard lock(mutex_);
     state_ = *std::move(state);
   }
@@ -196,16 +224,16 @@ void RobotEnd::order(double now) {
   }
   const SetPoint::Order order = step_.next(tick, seen, lead_.press, at, now);
   contact_ = at.force;
-  if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
+  if (at.fault.empty()) robot_->command({order.position, order.orientation}, order.velocity, now);
   if (const auto found = learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))
     says_.touched.write(message_of(*found));
-  say(at.fault);
+  say(at.fault.empty() ? step_.trouble() : at.fault);
 }
 
 void RobotEnd::report(double now) {
   const RobotState at = state();
   const ros::Header header{dds::stamp_of(now), "world"};
-  says_.tool.write(ros::PoseStamped{header, components(at.position)});
+  says_.tool.write(pose_of(header, at.position, at.orientation));
   says_.twist.write(ros::TwistStamped{header, components(at.velocity)});
   says_.contact.write(ros::WrenchStamped{header, components(contact_), {}});
   ros::Float64MultiArray links;

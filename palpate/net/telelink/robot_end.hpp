@@ -27,6 +27,9 @@ struct RobotEndOptions {
   DepthPacking packing = DepthPacking::rvl;
   double margin = SetPointOptions{}.margin;  ///< [m] as SetPointOptions
   double press_share = 0.0;                  ///< [-] as SetPointOptions
+  /// What the robot touches with, as SessionSpec::tool, in the frame of its reported poses; the
+  /// session at the robot keeps all of it out of what is seen. Empty: a ball.
+  std::string tool = {};
   /// Forbidden regions of the robot, also sent to operators; null: only its workspace.
   std::shared_ptr<const FixtureSet> fixtures = {};
 };
@@ -35,14 +38,16 @@ struct RobotEndOptions {
 ///
 /// A session here has the led hand as its device and the robot's cameras; its proxy, which they
 /// keep out of what they see, is where the tool goes (SetPoint). Topics, all of ROS's own types: in
-/// /NAME/teleop/place (PoseStamped), /NAME/teleop/press (WrenchStamped); out /NAME/teleop/tool
-/// (PoseStamped), twist (TwistStamped), contact (WrenchStamped), links
+/// /NAME/teleop/place (PoseStamped, whose orientation is Lead::turn), /NAME/teleop/press
+/// (WrenchStamped); out /NAME/teleop/tool and found (PoseStamped: now, and at first), twist
+/// (TwistStamped), contact (WrenchStamped), links
 ///     (Float64MultiArray: x, y, z of each joint), fault (String), regions (String: fixtures as
 ///     JSON), /NAME/joint_states (JointState), and the camera's (Ros2CameraPublisher).
 class RobotEnd {
  public:
   /// Waits up to 5 s for the robot's first state.
-  /// @throws Error if the robot reports nothing, an option is out of range, or DDS is missing.
+  /// @throws Error if the robot reports nothing, an option is out of range, a tool with a shape is
+  ///         of a robot that does not turn, or DDS is missing.
   RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
   ~RobotEnd();  ///< the robot rests
 
@@ -73,6 +78,7 @@ class RobotEnd {
   std::vector<ApproachWatch> watches_;  // one a camera
   const std::shared_ptr<const FixtureSet> regions_;
   const RobotEndOptions options_;
+  const double tool_reach_;  // [m] of a tool with a shape; 0: a ball
   std::shared_ptr<LedHand> hand_;
   RobotStep step_;  // of the leading thread
   Ros2CameraPublisher publisher_;

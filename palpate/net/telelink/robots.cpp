@@ -10,10 +10,10 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/drivers/dds.hpp"
-#include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/core/tick.hpp"
+#include "palpate/net/telelink/topics.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -31,22 +31,25 @@ class PointRobot final : public Robot {
           uri.number_option(std::string(1, "xyz"[axis]), axis == 2 ? 0.1 : 0.0, -10.0, 10.0, "m");
     info_.uri = uri.text();
     info_.kind = "ball that follows and touches nothing";
+    info_.turns = true;
     info_.lag = uri.number_option("lag", info_.lag, 0.01, 1.0, "s");
   }
 
   [[nodiscard]] const RobotInfo& info() const override { return info_; }
 
-  void command(const Vec3& position, const Vec3& /*velocity*/, double t) noexcept override {
-    if (!is_place(position)) return;
+  void command(const HandPose& pose, const Vec3& /*velocity*/, double t) noexcept override {
+    if (!is_place(pose.position) || !is_rotation(pose.orientation)) return;
     step(t);
-    target_ = position;
+    target_ = pose.position;
+    target_turn_ = pose.orientation;
     commanded_ = t;
   }
 
   [[nodiscard]] std::optional<RobotState> state() override {
     const double t = monotonic_now();
     step(t);
-    return RobotState{.t = t, .position = position_, .velocity = velocity_};
+    return RobotState{
+        .t = t, .position = position_, .orientation = turn_.orientation, .velocity = velocity_};
   }
 
  private:
@@ -57,7 +60,11 @@ class PointRobot final : public Robot {
     const double w = 2.0 / info_.lag;
     for (double left = std::clamp(t - last_, 0.0, longest); left > 0.0; left -= substep) {
       const double dt = std::min(left, substep);
-      if (t - commanded_ > own_stop) target_ = position_;
+      if (t - commanded_ > own_stop) {
+        target_ = position_;
+        target_turn_ = turn_.orientation;
+      }
+      turn_.follow(target_turn_, dt);
       velocity_ += dt * (w * w * (target_ - position_) - 2.0 * w * velocity_);
       position_ += dt * velocity_;
     }
@@ -66,6 +73,8 @@ class PointRobot final : public Robot {
 
   RobotInfo info_;
   Vec3 position_ = Vec3::Zero(), velocity_ = Vec3::Zero(), target_ = Vec3::Zero();
+  SimulatedTurn turn_;
+  Rotation target_turn_ = Rotation::Identity();
   double last_ = 0.0, commanded_ = -1e9;  // [s]
 };
 
@@ -75,12 +84,13 @@ class ToolInScene final : public SceneRobot {
   ToolInScene(std::shared_ptr<const Scene> scene, const Vec3& begin, const std::string& uri)
       : scene_(std::move(scene)),
         tool_(begin, [this](const Vec3& place, double t) { return surface(place, t); }),
-        target_(begin) {
+        target_{begin, Rotation::Identity()} {
     info_.uri = uri;
     info_.kind = "simulated tool";
     info_.lag = SimulatedTool::lag();
     info_.stiffness = SimulatedTool::stiffness();
     info_.tool_radius = SimulatedTool::radius;
+    info_.turns = true;
     thread_ = std::thread([this] { run(); });
   }
   ~ToolInScene() override {
@@ -90,16 +100,17 @@ class ToolInScene final : public SceneRobot {
 
   [[nodiscard]] const RobotInfo& info() const override { return info_; }
   void relate(double loop, double scene) override { ahead_ = scene - loop; }
-  void command(const Vec3& position, const Vec3& /*velocity*/, double t) noexcept override {
-    if (!is_place(position)) return;
+  void command(const HandPose& pose, const Vec3& /*velocity*/, double t) noexcept override {
+    if (!is_place(pose.position) || !is_rotation(pose.orientation)) return;
     const std::lock_guard lock(mutex_);
-    target_ = position;
+    target_ = pose;
     commanded_ = t;
   }
   [[nodiscard]] std::optional<RobotState> state() override {
     const std::lock_guard lock(mutex_);
     return RobotState{.t = monotonic_now(),
                       .position = tool_.place(),
+                      .orientation = turn_.orientation,
                       .velocity = tool_.velocity(),
                       .force = tool_.contact()};
   }
@@ -119,9 +130,11 @@ class ToolInScene final : public SceneRobot {
       done = std::max(done, now - longest);
       const std::lock_guard lock(mutex_);
       for (; done + step <= now; done += step) {
-        if (done - commanded_ > own_stop && std::exchange(led_, false)) target_ = tool_.place();
+        if (done - commanded_ > own_stop && std::exchange(led_, false))
+          target_ = {tool_.place(), turn_.orientation};
         led_ = led_ || done - commanded_ <= own_stop;
-        tool_.lead_to(target_, done + step + ahead_, step);
+        turn_.follow(target_.orientation, step);
+        tool_.lead_to(target_.position, done + step + ahead_, step);
       }
     }
   }
@@ -130,7 +143,8 @@ class ToolInScene final : public SceneRobot {
   std::shared_ptr<const Scene> scene_;
   std::mutex mutex_;
   SimulatedTool tool_;  // guarded by it, as what follows
-  Vec3 target_;
+  SimulatedTurn turn_;
+  HandPose target_;
   double commanded_ = -1e9;  // [s]
   bool led_ = false;
   std::atomic<double> ahead_{0.0};  // [s] the scene's time less the loop's
@@ -149,11 +163,12 @@ std::string topic_option(const Uri& uri, const std::string& name, const std::str
 class Ros2Robot final : public Robot {
  public:
   explicit Ros2Robot(const Uri& uri) : participant_(uri.text()) {
-    uri.allow_only(std::array<std::string_view, 11>{"command", "pose", "wrench", "joints", "frame",
+    uri.allow_only(std::array<std::string_view, 12>{"command", "pose", "wrench", "joints", "frame",
                                                     "lag", "stiffness", "max_speed", "max_force",
-                                                    "radius", "wait"});
+                                                    "radius", "wait", "turns"});
     info_.uri = uri.text();
     info_.kind = "arm of ROS 2";
+    info_.turns = uri.has("turns");
     info_.lag = uri.number_option("lag", info_.lag, 0.0, 1.0, "s");
     if (uri.has("stiffness"))
       info_.stiffness = uri.number_option("stiffness", 1000.0, 1.0, 1e6, "N/m");
@@ -187,12 +202,11 @@ class Ros2Robot final : public Robot {
 
   [[nodiscard]] const RobotInfo& info() const override { return info_; }
 
-  void command(const Vec3& position, const Vec3& /*velocity*/, double /*t*/) noexcept override {
-    if (!is_place(position)) return;
+  void command(const HandPose& pose, const Vec3& /*velocity*/, double /*t*/) noexcept override {
+    if (!is_place(pose.position) || !is_rotation(pose.orientation)) return;
     try {
-      // The tool keeps the orientation in which it was found.
-      commands_->write(ros::PoseStamped{
-          {ros::Time::now(), frame_}, {position.x(), position.y(), position.z()}, orientation_});
+      commands_->write(pose_of({ros::Time::now(), frame_}, pose.position,
+                               info_.turns ? unit(pose.orientation) : found_));
     } catch (const std::exception&) {  // what is not sent stops the arm
     }
   }
@@ -211,12 +225,15 @@ class Ros2Robot final : public Robot {
     bool any = false;
     while (const auto pose = poses_->take_whole<ros::PoseStamped>()) {
       const Vec3 position(pose->position[0], pose->position[1], pose->position[2]);
-      if (!is_place(position)) continue;
+      const Rotation orientation = orientation_of(*pose);
+      const bool is_turn = is_rotation(orientation);
+      if (!is_place(position) || (info_.turns && !is_turn)) continue;
       const double t = monotonic_now();
       const double dt = t - state_.t;
       constexpr double shortest = 1e-4;  // [s]
       if (state_.t > 0.0 && dt > shortest) state_.velocity = (position - state_.position) / dt;
-      if (state_.t == 0.0) orientation_ = pose->orientation;
+      if (state_.t == 0.0) found_ = orientation;
+      if (is_turn) state_.orientation = unit(orientation);
       state_.position = position;
       state_.t = t;
       any = true;
@@ -240,7 +257,7 @@ class Ros2Robot final : public Robot {
   std::optional<dds::Writer> commands_;
   std::optional<dds::Reader> poses_, wrenches_, joints_;
   std::string frame_;
-  std::array<double, 4> orientation_{0.0, 0.0, 0.0, 1.0};
+  Rotation found_ = Rotation::Identity();  // how the tool was turned at first
   RobotState state_;
 };
 

@@ -8,7 +8,7 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/core/hand.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/mailbox.hpp"
@@ -18,25 +18,34 @@ namespace palpate {
 
 /// Teleoperation command: all data that the operator's end sends.
 ///
-/// The position is the operator's proxy (ServoTick::place), never the HIP: the robot is never
-/// commanded into surfaces and fixtures that stop the proxy at the operator's end.
+/// Position and orientation are the operator's proxy's (ServoTick::place), never the HIP's: the
+/// robot is never commanded into surfaces and fixtures that stop the proxy at the operator's end.
 struct Lead {
   Vec3 place = Vec3::Zero();  ///< [m] world: where the tool is to be
   Vec3 press = Vec3::Zero();  ///< [N] world: with which the operator presses there
+  /// World axes: from the orientation in which the tool was found to the one that it is to have.
+  Rotation turn = Rotation::Identity();
   /// Is the command valid? Not while the device is released, clutched or faulty, or without frames.
   bool leads = false;
 };
 
-/// Of a tick at the operator's end.
+/// Of a tick at the operator's end. The tool's turn is that of the proxy from a handle that is
+/// aligned with the device: identity where the device tells no orientation.
 Lead lead_of(const ServoTick& tick) noexcept;
 
 /// How a robot follows commands.
 struct LeadLimits {
-  double max_speed = 0.25;  ///< [m/s] speed limit: the reduced speed of ISO 10218
+  /// [m/s] speed limit of the tool's farthest point, which a turn moves too: the reduced speed of
+  /// ISO 10218
+  double max_speed = 0.25;
   /// [m/s] speed limit in contact; it rises with the clearance. A tool of 3 kg that hits a surface
   /// of 10 kN/m at 0.029 m/s reaches 5 N, and a tool with lag cuts corners.
   double contact_speed = 0.03;
   double near_time = 0.2;  ///< [s] the clearance over this is the speed that it allows beyond that
+  /// [m] from the tool's centre to its farthest point. At least 0.1: a turn about the tip of a tool
+  /// moves the hand behind it.
+  double lever = 0.1;
+  bool turns = true;  ///< as RobotInfo::turns: false: the tool's orientation is not led
   /// [m] world: commands beyond it are followed to its boundary; empty: no limit
   std::optional<Eigen::AlignedBox3d> reach = {};
   /// [s] without a command, after which the tool is stopped where it is. Longer than the network
@@ -51,14 +60,16 @@ void validate(const LeadLimits& limits);
 /// The device at the robot's end: the received commands are the HIP of a session there, so that the
 /// camera at the robot keeps its proxy, and with it the robot, out of the visible surface.
 ///
-/// Follows the newest command at a limited speed. Without commands, operator or frames it rests at
-/// the tool and still counts as a hand: a moving surface pushes the proxy, and the robot with it.
-/// Afterwards it follows commands again from there, slowly at first.
+/// Follows the newest command at a limited speed, turns included. Without commands, operator or
+/// frames it rests at the tool and still counts as a hand: a moving surface pushes the proxy, and
+/// the robot with it. Afterwards it follows commands again from there, slowly at first.
 class LedHand final : public Device {
  public:
   /// @param begin  [m] world: where the tool is
+  /// @param found  world_from_tool: how it is turned, for which Lead::turn is the identity
   /// @throws Error as validate().
-  explicit LedHand(const Vec3& begin, const LeadLimits& limits = {}, std::string uri = "teleop:");
+  explicit LedHand(const Vec3& begin, const LeadLimits& limits = {},
+                   const Rotation& found = Rotation::Identity(), std::string uri = "teleop:");
 
   /// A command has arrived. One thread.
   /// @param now  [s] on the loop's clock
@@ -68,8 +79,9 @@ class LedHand final : public Device {
   /// Distance from the tool to the visible surface at the robot's end [m]; 0 in contact. Any
   /// thread.
   void clearance(double gap) noexcept { gap_.store(gap, std::memory_order_relaxed); }
-  /// Reported position of the robot's tool [m, world]. One thread.
-  void tool_is_at(const Vec3& place);
+  /// Reported position [m, world] and orientation (world_from_tool) of the robot's tool. One
+  /// thread.
+  void tool_is_at(const Vec3& place, const Rotation& turn = Rotation::Identity());
   /// Displacement of the proxy by forbidden regions from its position on the surface [m, world];
   /// zero: none. The HIP is displaced by the same vector, so that the surface is searched where the
   /// tool may be: beyond the border of a region it may be another one. One thread, once a tick.
@@ -91,12 +103,13 @@ class LedHand final : public Device {
   DeviceInfo info_;
   LeadLimits limits_;
   Mailbox<Heard> leads_;
-  Mailbox<Vec3> tools_, ways_;
+  Mailbox<HandPose> tools_;
+  Mailbox<Vec3> ways_;
   std::atomic<bool> sees_{true}, led_{false};
   std::atomic<double> gap_{1.0};  // [m]
   // The servo's thread
-  Vec3 tool_;
-  Vec3 place_;
+  const Rotation found_;
+  HandPose tool_, pose_;
   double last_t_ = 0.0;   // [s]
   double kept_at_ = 0.0;  // [s] when it was last told what keeps it out
   double led_for_ = 0.0;  // [s] since it was taken up

@@ -5,13 +5,23 @@
 #include <cmath>
 #include <numbers>
 
+#include "palpate/kernel/core/rotation.hpp"
+
 namespace palpate {
 
-double SimulatedTool::stiffness() {
-  constexpr double loop_rate = 4.0;  // [Hz] of a robot's own loop, as labs have measured it
-  const double w = 2.0 * std::numbers::pi * loop_rate;
-  return mass * w * w;
+namespace {
+
+constexpr double loop_rate = 2.0 * std::numbers::pi * 4.0;  // [rad/s] as labs have measured it
+
+}  // namespace
+
+void SimulatedTurn::follow(const Rotation& wanted, double dt) noexcept {
+  const Vec3 left = rotation_vector(between(wanted, orientation));
+  spin += dt * loop_rate * (loop_rate * left - 2.0 * spin);
+  orientation = unit(product(rotation_by(dt * spin), orientation));
 }
+
+double SimulatedTool::stiffness() { return mass * loop_rate * loop_rate; }
 
 double SimulatedTool::damping() { return 2.0 * std::sqrt(stiffness() * mass); }
 

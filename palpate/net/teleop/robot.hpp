@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/core/hand.hpp"
 
 namespace palpate {
 
@@ -27,20 +27,22 @@ struct RobotInfo {
   double max_force = 5.0;      ///< [N] with which the tool may press
   double tool_radius = 0.005;  ///< [m] of the ball at the tool's tip that touches
   std::vector<std::string> joint_names = {};
+  bool turns = false;  ///< it follows orientations; else its tool keeps the one that it has
 };
 
 /// State that a robot reports.
 struct RobotState {
-  double t = 0.0;                   ///< [s] time of this state, on the servo loop's clock
-  Vec3 position = Vec3::Zero();     ///< [m] world: the centre of the ball at the tool's tip
-  Vec3 velocity = Vec3::Zero();     ///< [m/s] world
-  Vec3 force = Vec3::Zero();        ///< [N] world: contact force on the tool
-  std::vector<double> joints = {};  ///< [rad], as RobotInfo::joint_names
-  std::vector<Vec3> links = {};     ///< [m] world: the arm as a line from base to tip; may be empty
-  std::string fault = {};           ///< why it does not move, with the remedy; empty: it moves
+  double t = 0.0;                ///< [s] time of this state, on the servo loop's clock
+  Vec3 position = Vec3::Zero();  ///< [m] world: the centre of the ball at the tool's tip
+  Rotation orientation = Rotation::Identity();  ///< world_from_tool, if it turns
+  Vec3 velocity = Vec3::Zero();                 ///< [m/s] world
+  Vec3 force = Vec3::Zero();                    ///< [N] world: contact force on the tool
+  std::vector<double> joints = {};              ///< [rad], as RobotInfo::joint_names
+  std::vector<Vec3> links = {};  ///< [m] world: the arm as a line from base to tip; may be empty
+  std::string fault = {};        ///< why it does not move, with the remedy; empty: it moves
 };
 
-/// A robot that follows positions of its tool tip: an arm, simulated or real.
+/// A robot that follows poses of its tool tip: an arm, simulated or real.
 ///
 /// Functions may be called by one thread at a time.
 class Robot {
@@ -51,13 +53,21 @@ class Robot {
   Robot& operator=(const Robot&) = delete;
 
   [[nodiscard]] virtual const RobotInfo& info() const = 0;
-  /// Commanded position of the tool tip. Called several hundred times a second. A robot must stop
+  /// Commanded pose of the tool tip. Called several hundred times a second. A robot must stop
   /// by itself after 100 ms without a command.
-  /// @param position  [m] world, finite
-  /// @param velocity [m/s] world, of that position: for feed-forward
-  virtual void command(const Vec3& position, const Vec3& velocity, double t) noexcept = 0;
+  /// @param pose  [m] world, finite; the orientation is for robots that turn
+  /// @param velocity [m/s] world, of the position: for feed-forward
+  virtual void command(const HandPose& pose, const Vec3& velocity, double t) noexcept = 0;
   /// The newest state. Empty before the robot has reported one.
   [[nodiscard]] virtual std::optional<RobotState> state() = 0;
+};
+
+/// How a simulated tool turns: a critically damped loop of 4 Hz, which nothing touches.
+struct SimulatedTurn {
+  Rotation orientation = Rotation::Identity();  ///< world_from_tool
+  Vec3 spin = Vec3::Zero();                     ///< [rad/s] world
+  /// @param dt  [s] at most some milliseconds
+  void follow(const Rotation& wanted, double dt) noexcept;
 };
 
 /// Model of a robot's tool: a ball with the moving mass, pulled by a critically damped spring, in

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 namespace {
@@ -31,6 +32,9 @@ constexpr double acceleration = 1.0;     // [m/s^2] of what is led, after a cont
 // The share of the way to its goal that a first-order lag goes in dt.
 double share_of(double dt, double time) { return 1.0 - std::exp(-dt / time); }
 
+constexpr const char* in_a_surface =
+    "the tool is in what the camera sees: move the arm until it is free";
+
 Vec3 no_longer_than(const Vec3& v, double longest) {
   const double size = v.norm();
   return size > longest ? Vec3(longest / size * v) : v;
@@ -44,6 +48,8 @@ Vec3 without_part_against(const Vec3& unit, const Vec3& v) {
 
 void validate(const SetPointOptions& options) {
   check_range("teleop", "tool_radius", "m", 1e-4, 0.05, options.tool_radius);
+  check_range("teleop", "tool_reach", "m", 0.0, 5.0, options.tool_reach);
+  check_range("teleop", "lever", "m", 0.01, 5.0, options.lever);
   check_range("teleop", "margin", "m", 0.0, 0.05, options.margin);
   check_range("teleop", "lag", "s", 0.0, 1.0, options.lag);
   if (options.stiffness) check_range("teleop", "stiffness", "N/m", 1.0, 1e6, *options.stiffness);
@@ -65,8 +71,9 @@ std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures) {
   return std::make_shared<const FixtureSet>(regions);
 }
 
-ServoTick with_proxy_at(const Vec3& tool, ServoTick tick) {
+ServoTick with_proxy_at(const Vec3& tool, ServoTick tick, const Rotation& turn) {
   tick.place = tick.tick.proxy = tool;
+  tick.tick.proxy_orientation = turn;
   tick.tick.state = ContactState::free_motion;
   tick.tick.normal = Vec3::Zero();
   tick.tick.surface_velocity = 0.0;
@@ -94,14 +101,22 @@ Vec3 SetPoint::way_out(const Vec3& place, const Approach& comes, double t) const
 // contact and for a while after: one that a noisy image lets fall must not take the tool along.
 // Nor does it go fast against what pushes the tool: what is touched from behind is none of its; nor
 // along a normal that has just turned round, as it does where a proxy slips under a noisy surface.
-Vec3 SetPoint::followed(const Vec3& held, bool touches, const Vec3& force, double dt) noexcept {
+void SetPoint::follow(const HandPose& held, bool touches, const Vec3& force, double dt) noexcept {
   const double fastest = options_.max_speed + fastest_surface;
   speed_ = touches ? options_.contact_speed : std::min(speed_ + acceleration * dt, fastest);
-  const Vec3 way = held - held_;
+  const Vec3 way = held.position - held_.position;
   const bool believed = normal_.dot(force) >= -touching_force && normal_.dot(usual_) >= 0.0;
   const double along = believed ? std::max(way.dot(normal_), 0.0) : 0.0;
   const Vec3 outward = along * normal_;
-  return held_ + outward + no_longer_than(way - outward, speed_ * dt);
+  const Vec3 rest = way - outward;
+  const Vec3 turn = rotation_vector(between(held.orientation, held_.orientation));
+  const double swing = options_.lever * turn.norm();  // [m] of the farthest point
+  const double far = rest.norm() + swing;
+  double share = far > speed_ * dt ? speed_ * dt / far : 1.0;
+  held_.position += outward + share * rest;
+  // A proxy that is reset turns at once; a robot's hand keeps to its own speed.
+  if (share * swing > options_.max_speed * dt) share = options_.max_speed * dt / swing;
+  held_.orientation = unit(product(rotation_by(share * turn), held_.orientation));
 }
 
 // Hazard: robot-collides, robot-presses, robot-struck
@@ -153,13 +168,19 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
   // A stop takes the set-point back to the tool at once; so does the beginning.
   const bool stops = std::exchange(led_, led) && !led;
   const bool at_once = !began_ || stops;
-  const Vec3 held = record.place + (ahead * options_.lag * approach_ - depth_) * normal_;
-  held_ = at_once ? held : followed(held, touches, pushed, dt);
+  const HandPose held{
+      .position = record.place + (ahead * options_.lag * approach_ - depth_) * normal_,
+      .orientation =
+          is_rotation(tick.proxy_orientation) ? tick.proxy_orientation : held_.orientation};
+  if (at_once)
+    held_ = held;
+  else
+    follow(held, touches, pushed, dt);
   // The first place of all lies outside of all regions; what would be out of the way may not.
-  Vec3 goal = held_;
+  Vec3 goal = held_.position;
   if (began_) {
     // Never into what is touched, by the image or by the robot's own force.
-    Vec3 out = way_out(held_, comes, tick.t);
+    Vec3 out = way_out(held_.position, comes, tick.t);
     if (touches) out = without_part_against(normal_, out);
     if (size > touching_force) out = without_part_against(pushed / size, out);
     const double far = out_.norm();
@@ -185,7 +206,7 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
                     .new_frame = false})
               .displacement;
   const double step = (options_.max_speed + fastest_surface) * dt;
-  Order order;
+  Order order{.orientation = held_.orientation};
   order.position = at_once ? goal : Vec3(sent_ + no_longer_than(goal - sent_, step));
   if (!at_once && dt > 0.0) order.velocity = (order.position - sent_) / dt;
   sent_ = order.position;
@@ -208,19 +229,42 @@ Outlook outlook(std::span<ApproachWatch> watches, const Vec3& proxy, const Vec3&
   return all;
 }
 
+// Hazard: robot-collides
+const char* RobotStep::unguarded(const ServoTick& tick, const RobotState& at) const noexcept {
+  const auto angle = [](const Rotation& a, const Rotation& b) {
+    return rotation_vector(between(a, b)).norm();
+  };
+  constexpr double none = 1e-6;  // [rad]
+  // A tool that begins inside a surface is moved by its hand alone, without a step.
+  if (options_.tool_reach > 0.0 && tick.tick.steps == 0 && (tick.tick.flags & no_frame) == 0)
+    return in_a_surface;
+  if (!options_.turns && !(angle(tick.tick.proxy_orientation, tick.tick.orientation) < none))
+    return "a tool with a shape needs a robot that turns: choose the ball";
+  if (options_.turns && began_ && !(angle(at.orientation, ordered_) < most_behind))
+    return "the arm does not turn as it is led: check its command topic, or leave out turns";
+  return "";
+}
+
 SetPoint::Order RobotStep::next(ServoTick& tick, const Outlook& outlook, const Vec3& press,
                                 RobotState& at, double now) noexcept {
-  if (outlook.is_lost) tick = with_proxy_at(at.position, tick);
+  trouble_ = unguarded(tick, at);
+  const bool is_lost = outlook.is_lost || *trouble_ != '\0';
+  if (is_lost) tick = with_proxy_at(at.position, tick, at.orientation);
   const bool in_the_open = tick.tick.state == ContactState::free_motion;
-  hand_.sees(tick.frame_age <= blind_after && !outlook.is_lost);
-  const double clear = outlook.clearance - radius_;
+  hand_.sees(tick.frame_age <= blind_after && !is_lost);
+  const double clear = outlook.clearance - options_.tool_radius;
   const double way = (tick.place - at.position).norm();
-  hand_.clearance(in_the_open ? clear - way : 0.0);
-  at.force =
-      force_zero_.next(now, at.force, in_the_open && !outlook.is_lost && clear > ForceZero::clear);
+  const double beyond = std::max(options_.tool_reach - options_.tool_radius, 0.0);
+  hand_.clearance(in_the_open ? clear - beyond - way : 0.0);
+  at.force = force_zero_.next(now, at.force, in_the_open && !is_lost && clear > ForceZero::clear);
   hand_.kept_out(tick.place - tick.tick.proxy);
-  led_ = hand_.is_led() && !outlook.is_lost;
-  return set_point_.next(tick, press, led_, outlook.comes, at.force);
+  led_ = hand_.is_led() && !is_lost;
+  // From the inside, what comes is on the wrong side.
+  const Approach comes = trouble_ == in_a_surface ? Approach{} : outlook.comes;
+  const SetPoint::Order order = set_point_.next(tick, press, led_, comes, at.force);
+  ordered_ = order.orientation;
+  began_ = true;
+  return order;
 }
 
 }  // namespace palpate

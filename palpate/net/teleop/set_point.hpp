@@ -18,6 +18,10 @@ namespace palpate {
 /// Options of the robot's set-point.
 struct SetPointOptions {
   double tool_radius = 5e-3;  ///< [m] as RobotInfo::tool_radius
+  /// [m] from the centre to the farthest point of a tool with a shape; 0: a ball
+  double tool_reach = 0.0;
+  bool turns = true;                  ///< as RobotInfo::turns
+  double lever = LeadLimits{}.lever;  ///< [m] as LeadLimits::lever
   /// [m] by which the tool stays away from the visible surface: the proxy's radius at the robot's
   /// end is larger by it
   double margin = 2e-3;
@@ -42,10 +46,11 @@ void validate(const SetPointOptions& options);
 
 /// A tick at the robot's end for a lost proxy (ApproachWatch::is_between): no contact, and the
 /// proxy is at the tool.
-/// @param tool  [m, world]
-ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
+/// @param tool  [m, world] @param turn  world_from_tool
+ServoTick with_proxy_at(const Vec3& tool, ServoTick tick,
+                        const Rotation& turn = Rotation::Identity());
 
-/// The commanded position of the robot's tool: the proxy at the robot's end, which its camera keeps
+/// The commanded pose of the robot's tool: the proxy at the robot's end, which its camera keeps
 /// out of the visible surface,
 /// - plus a distance from the touched surface: twice the noise of the image, the speed of recent
 ///   motion times the robot's lag, and 0.2 s of the surface's recent speed, in which a reversal
@@ -56,15 +61,17 @@ ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
 /// - away from any contact, visible or not, with more than `unwanted_force` above that, or more
 ///   than `max_force`.
 /// Forbidden regions have priority over all that. An approaching object moves it at once; a proxy
-/// that drops, perhaps because of image noise, moves it only at `contact_speed`.
+/// that drops, perhaps because of image noise, moves it only at `contact_speed`. The orientation is
+/// the proxy's, at the same speeds of the tool's farthest point.
 /// Values in, values out: no clock, no thread. [servo]
 class SetPoint {
  public:
   explicit SetPoint(const SetPointOptions& options = {});
 
   struct Order {
-    Vec3 position = Vec3::Zero();  ///< [m] world
-    Vec3 velocity = Vec3::Zero();  ///< [m/s] world
+    Vec3 position = Vec3::Zero();                 ///< [m] world
+    Vec3 velocity = Vec3::Zero();                 ///< [m/s] world
+    Rotation orientation = Rotation::Identity();  ///< world_from_tool
   };
 
   /// @param tick   at the robot's end
@@ -76,7 +83,7 @@ class SetPoint {
              const Vec3& force) noexcept;
 
  private:
-  Vec3 followed(const Vec3& held, bool touches, const Vec3& force, double dt) noexcept;
+  void follow(const HandPose& held, bool touches, const Vec3& force, double dt) noexcept;
   [[nodiscard]] Vec3 way_out(const Vec3& place, const Approach& comes, double t) const noexcept;
 
   SetPointOptions options_;
@@ -87,7 +94,7 @@ class SetPoint {
   Vec3 normal_ = Vec3::UnitZ();  // of the last contact
   Vec3 usual_ = Vec3::Zero();    // the same, over `turn_time`
   bool touched_ = false;
-  Vec3 held_ = Vec3::Zero();     // [m] world: the proxy as it is followed
+  HandPose held_;                // [m] world: the proxy as it is followed
   double speed_ = 0.0;           // [m/s] at which it is followed at most
   double lately_ = 0.0;          // [m/s] of what is touched or comes, in the last seconds
   double touched_lately_ = 0.0;  // [m/s] of what is touched alone
@@ -157,7 +164,7 @@ class RobotStep {
  public:
   /// @param hand  the session's device; must outlive this
   RobotStep(LedHand& hand, const SetPointOptions& options)
-      : hand_(hand), set_point_(options), radius_(options.tool_radius) {}
+      : hand_(hand), set_point_(options), options_(options) {}
 
   /// @param tick   of the session; without a contact and with the proxy at the tool if it is lost
   /// @param press  [N] world: with which the operator presses
@@ -167,15 +174,26 @@ class RobotStep {
                        double now) noexcept;
   /// Did the last step follow the operator?
   [[nodiscard]] bool is_led() const { return led_; }
+  /// Why the tool's shape is not kept out of what is seen, so that nothing is followed; empty: it
+  /// is.
+  [[nodiscard]] const char* trouble() const { return trouble_; }
 
  private:
   static constexpr double blind_after = 0.2;  // [s] without a frame nothing is led
 
+  // [rad] A tool that lags by more does not follow: 0.2 at 0.25 m/s over 0.1 m, and a lag of 0.08 s
+  static constexpr double most_behind = 0.3;
+
+  [[nodiscard]] const char* unguarded(const ServoTick& tick, const RobotState& at) const noexcept;
+
   LedHand& hand_;
   SetPoint set_point_;
   ForceZero force_zero_;
-  double radius_;  // [m] of the tool
+  SetPointOptions options_;
+  Rotation ordered_ = Rotation::Identity();  // the last order's
+  bool began_ = false;
   bool led_ = false;
+  const char* trouble_ = "";
 };
 
 }  // namespace palpate

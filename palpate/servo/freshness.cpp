@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace palpate {
 namespace {
@@ -17,9 +18,11 @@ constexpr double shortest_interval = 1e-3;
 void Freshness::Interval::add(double seconds) noexcept {
   last_[added_ % count] = std::max(seconds, shortest_interval);
   ++added_;
-  std::array<double, count> sorted = last_;
   const std::size_t n = std::min(added_, count);
-  std::sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n));
+  std::array<double, count> sorted;
+  sorted.fill(std::numeric_limits<double>::infinity());
+  std::copy_n(last_.begin(), n, sorted.begin());
+  std::sort(sorted.begin(), sorted.end());  // of all: gcc 14 warns of an end that it cannot know
   usual_ = sorted[n / 2];
 }
 

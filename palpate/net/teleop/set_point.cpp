@@ -261,7 +261,7 @@ SetPoint::Order RobotStep::next(ServoTick& tick, const Outlook& outlook, const V
   led_ = hand_.is_led() && !is_lost;
   // From the inside, what comes is on the wrong side.
   const Approach comes = trouble_ == in_a_surface ? Approach{} : outlook.comes;
-  const SetPoint::Order order = set_point_.next(tick, press, led_, comes, at.force);
+  SetPoint::Order order = set_point_.next(tick, press, led_, comes, at.force);
   ordered_ = order.orientation;
   began_ = true;
   return order;

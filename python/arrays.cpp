@@ -7,6 +7,7 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate::python {
 namespace {
@@ -102,7 +103,7 @@ Rotation rotation_of(const std::optional<Numbers>& quaternion) {
   const char* const give = "a unit quaternion x, y, z, w that turns the tool into the world";
   check_shape(*quaternion, "orientation", {4}, give);
   const Rotation turn(Eigen::Map<const Eigen::Vector4d>(quaternion->data()));
-  if (!(std::abs(turn.norm() - 1.0) <= 0.01))
+  if (!is_rotation(turn))
     throw Error("orientation", "its length is " + std::to_string(turn.norm()) + ", not 1",
                 std::string("give ") + give);
   return turn.normalized();

@@ -13,6 +13,7 @@
 
 #include "palpate/kernel/core/csv.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 namespace {
@@ -27,7 +28,7 @@ std::string fault(const HipPath::Sample& sample, std::span<const HipPath::Sample
   if (!std::isfinite(sample.t)) return "t is not finite";
   if (!sample.hip.allFinite()) return "x, y or z is not finite";
   if (sample.hip.cwiseAbs().maxCoeff() > farthest) return "the position is beyond 1000 km";
-  if (!(std::abs(sample.turn.norm() - 1.0) < 0.01)) return "qx,qy,qz,qw is no unit quaternion";
+  if (!is_rotation(sample.turn)) return "qx,qy,qz,qw is no unit quaternion";
   if (before.empty()) return {};
   if (!(sample.t > before.back().t)) return "t does not increase";
   if (sample.t - before.front().t > longest) return "the path is longer than 1000000 s";

@@ -10,6 +10,7 @@
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 namespace {
@@ -119,7 +120,7 @@ Trajectory parse_trajectory(std::string_view text, const std::string& name) {
         }
         const auto [tx, ty, tz, qx, qy, qz, qw] = numbers;
         const Eigen::Quaterniond rotation(qw, qx, qy, qz);
-        if (!(std::abs(rotation.norm() - 1.0) < 0.01))
+        if (!is_rotation(rotation))
           throw Error(where, "the quaternion is not of length 1", "give qx qy qz qw of a rotation");
         samples.push_back({stamp, {tx, ty, tz}, rotation.normalized()});
       });

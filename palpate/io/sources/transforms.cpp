@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 namespace {
@@ -49,7 +50,7 @@ Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::
   const auto& [qx, qy, qz, qw] = transform.rotation;
   const Eigen::Quaterniond rotation(qw, qx, qy, qz);
   const Eigen::Vector3d translation(x, y, z);
-  if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01))
+  if (!translation.allFinite() || !is_rotation(rotation))
     throw Error(name, "has a transform to " + transform.child_frame_id + " that is not rigid",
                 "ignore TF with ?fixed_frame=none");
   return {transform.header.stamp.seconds(), translation, rotation.normalized()};

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 
@@ -47,7 +48,7 @@ Eigen::Isometry3d parse_pose(std::string_view text, const std::string& subject) 
   const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
   if (translation.cwiseAbs().maxCoeff() > farthest)
     throw Error(subject, "the position is beyond 1000 km", remedy);
-  if (!(std::abs(rotation.norm() - 1.0) <= 0.01))
+  if (!is_rotation(rotation))
     throw Error(subject, "the quaternion's length is " + shortest(rotation.norm()), remedy);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = rotation.normalized().toRotationMatrix();

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 namespace {
@@ -238,7 +238,7 @@ std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
     if (message.size() == hand_size) return HandMessage{grip == Grip::held, target};
     const Rotation turned(read<double>(message, 56), read<double>(message, 32),
                           read<double>(message, 40), read<double>(message, 48));
-    if (!(std::abs(turned.norm() - 1.0) <= 0.01)) return std::nullopt;
+    if (!is_rotation(turned)) return std::nullopt;
     return HandMessage{grip == Grip::held, target, turned.normalized()};
   }
   if (kind == Kind::shown && message.size() == shown_size) {

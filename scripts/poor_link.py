@@ -17,8 +17,9 @@ root; with --check it exits 1 unless images came and the force was back after th
 Needs root, /dev/net/tun and Cyclone DDS. Exits 77 where namespaces or TAP devices are not allowed.
 """
 import argparse
+import collections
+import contextlib
 import fcntl
-import heapq
 import math
 import os
 import pathlib
@@ -45,31 +46,58 @@ DEPTH = 0.003  # [m] the hand is below the plane
 STALLED = 12  # bit of a tick's safety: docs/recording.md
 LEAST_FELT, FELT_FOR = 0.5, 200  # [N] of some 1.8, ticks
 NOT_POSSIBLE = 77
+Tick = collections.namedtuple("Tick", "t force_z frame_age frame_number safety")
 TOPICS = {"slices": "slices?", "images": "compressedDepth?reliable&"}
 
 
-class Link:
-    """Carries Ethernet frames between two TAP devices until it is closed."""
+class Way:
+    """One way of the link: what is on it, in order."""
 
     def __init__(self, options):
         self.options = options
-        self.random = random.Random(1)
+        self.waiting = collections.deque()  # ([s] when it arrives, frame)
+        self.free = self.last = self.spread = self.spread_until = 0.0
+
+    def send(self, frame, now, chance):
+        options, due = self.options, now
+        if chance.random() < options.loss / 100.0:
+            return
+        if options.rate:
+            if self.free > now + QUEUE:
+                return
+            due = self.free = max(self.free, now) + 8e-6 * len(frame) / options.rate
+        if now > self.spread_until:
+            self.spread_until = now + HELD_UP
+            self.spread = chance.uniform(-options.jitter, options.jitter)
+        self.last = max(due + max(options.delay + self.spread, 0.0) / 1000.0, self.last)
+        self.waiting.append((self.last, frame))
+
+
+class Link(contextlib.ExitStack):
+    """Carries Ethernet frames between two TAP devices until it is closed."""
+
+    def __init__(self, options):
+        super().__init__()
+        self.options = options
         self.is_open = True
         self.down_from = self.down_until = math.inf
         self.taps = []
-        self.thread = threading.Thread(target=self.carry)
-        try:
+        with contextlib.ExitStack() as undo:  # what was begun, where a later step fails
             for name, address in zip(SIDES, ("10.77.0.1/24", "10.77.0.2/24")):
                 self.taps.append(self.tap(name))
+                undo.callback(os.close, self.taps[-1])
+                undo.callback(subprocess.run, ["ip", "netns", "del", name], capture_output=True,
+                              check=False)
                 run("ip", "netns", "add", name)
                 run("ip", "link", "set", name, "netns", name)
                 up = f"link set {name} up"
                 for command in (f"addr add {address} dev {name}", up, "link set lo up"):
                     run("ip", "-n", name, *command.split())
-            self.thread.start()
-        except BaseException:  # what was begun is undone
-            self.close()
-            raise
+            thread = threading.Thread(target=self.carry)
+            thread.start()
+            self.push(undo.pop_all())
+        self.callback(thread.join)
+        self.callback(setattr, self, "is_open", False)
 
     @staticmethod
     def tap(name):
@@ -86,61 +114,27 @@ class Link:
         self.down_from, self.down_until = at, at + seconds
 
     def carry(self):
-        waiting, count = [], 0
-        free = [0.0, 0.0]  # [s] when what was sent before is through
-        last, spread, spread_until = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
-        options = self.options
+        chance = random.Random(1)
+        ways = [Way(self.options), Way(self.options)]
         while self.is_open:
-            now = time.monotonic()
-            pause = min(max(waiting[0][0] - now, 0.0), 0.1) if waiting else 0.1
+            next_due = min((way.waiting[0][0] for way in ways if way.waiting), default=math.inf)
+            pause = min(max(next_due - time.monotonic(), 0.0), 0.1)
             for tap in select.select(self.taps, [], [], pause)[0]:
-                way = self.taps.index(tap)
-                frame = os.read(tap, 65536)
-                now = time.monotonic()
-                if self.down_from <= now < self.down_until:
-                    continue
-                if self.random.random() < options.loss / 100.0:
-                    continue
-                due = now
-                if options.rate:
-                    if free[way] > now + QUEUE:
-                        continue
-                    due = free[way] = max(free[way], now) + 8e-6 * len(frame) / options.rate
-                if now > spread_until[way]:
-                    spread_until[way] = now + HELD_UP
-                    spread[way] = self.random.uniform(-options.jitter, options.jitter)
-                due += max(options.delay + spread[way], 0.0) / 1000.0
-                due = last[way] = max(due, last[way])
-                heapq.heappush(waiting, (due, count, 1 - way, frame))
-                count += 1
-            while waiting and waiting[0][0] <= time.monotonic():
-                _, _, to, frame = heapq.heappop(waiting)
-                try:
-                    os.write(self.taps[to], frame)
-                except BlockingIOError:
-                    pass  # its queue is full
-
-    def close(self):
-        self.is_open = False
-        if self.thread.is_alive():
-            self.thread.join()
-        for tap in self.taps:
-            os.close(tap)
-        remove_namespaces()
+                frame, now = os.read(tap, 65536), time.monotonic()
+                if not self.down_from <= now < self.down_until:
+                    ways[self.taps.index(tap)].send(frame, now, chance)
+            for way, to in zip(ways, reversed(self.taps)):
+                while way.waiting and way.waiting[0][0] <= time.monotonic():
+                    with contextlib.suppress(BlockingIOError):  # its queue is full
+                        os.write(to, way.waiting.popleft()[1])
 
 
 def run(*command):
     subprocess.run(command, check=True, capture_output=True)
 
 
-def remove_namespaces():
-    for name in SIDES:
-        subprocess.run(["ip", "netns", "del", name], capture_output=True, check=False)
-
-
 def ticks_of(folder):
-    """The numbers named here of each tick of a recording."""
-    wanted = ("t", "hip_z", "force_z", "frame_age", "frame_number", "safety")
+    """Each Tick of a recording."""
     names, ticks = [], []
     for topic, _, _, data, _ in mcap_messages.messages(next(folder.glob("*.mcap"))):
         if topic == "/palpate/session":
@@ -148,7 +142,7 @@ def ticks_of(folder):
             names = [name.strip('"') for name in names.split(",")]
         elif topic == "/palpate/tick":
             numbers = dict(zip(names, struct.unpack(f"<{len(names)}d", data[-8 * len(names):])))
-            ticks.append([numbers[name] for name in wanted])
+            ticks.append(Tick(*(numbers[name] for name in Tick._fields)))
     return ticks
 
 
@@ -166,61 +160,56 @@ def measure(options, program, again=5):
     """One session over the link, for a table once more where this machine was too busy for it.
 
     Returns the values of its line by their names."""
-    link = None if options.loopback else Link(options)
     environment = dict(os.environ)
     if options.loopback:
         environment.update(ROS_LOCALHOST_ONLY="1", ROS_DOMAIN_ID=str(100 + os.getpid() % 100))
-    try:
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            path = folder / "press.csv"
-            path.write_text("t,x,y,z\n0,0,0,0.05\n1,0,0,0.05\n2,0,0,%g\n%g,%g,0,%g\n" % (
-                -DEPTH, options.seconds, 0.005 * (options.seconds - 2.0), -DEPTH))
-            at = [[] if options.loopback else ["ip", "netns", "exec", name] for name in SIDES]
-            server = subprocess.Popen(
-                at[0] + [program, "serve-camera", "--camera", options.camera, "--name",
-                        "far", "--packing", options.packing],
-                stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
-            hand = subprocess.Popen(
-                at[1] + [program, "run", "--headless", "--json", "--duration",
-                        str(options.seconds), "--record", folder / "session", "--device",
-                        f"script:{path}", "--camera",
-                        "ros2:/far/depth/image_raw/" + TOPICS[options.way] + "wait=30s"],
-                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
-            if options.down:
-                down_at, seconds = (float(value) for value in options.down.split(":"))
-                while hand.poll() is None and not list(folder.glob("session/*.mcap")):
-                    time.sleep(0.01)
-                link.go_down(time.monotonic() + down_at, seconds)
-            _, said = hand.communicate()
-            server.send_signal(signal.SIGINT)
-            server.communicate()
-            if hand.returncode != 0:
-                sys.exit(f"poor_link: the session failed: {said.strip()}")
-            ticks = ticks_of(folder / "session")
-    finally:
-        if link:
-            link.close()
-    start = ticks[0][0]
+    at = [[] if options.loopback else ["ip", "netns", "exec", name] for name in SIDES]
+    with contextlib.nullcontext() if options.loopback else Link(options) as link, \
+            tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        path = folder / "press.csv"
+        path.write_text("t,x,y,z\n0,0,0,0.05\n1,0,0,0.05\n2,0,0,%g\n%g,%g,0,%g\n" % (
+            -DEPTH, options.seconds, 0.005 * (options.seconds - 2.0), -DEPTH))
+        server = subprocess.Popen(
+            at[0] + [program, "serve-camera", "--camera", options.camera, "--name", "far",
+                     "--packing", options.packing],
+            stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+        hand = subprocess.Popen(
+            at[1] + [program, "run", "--headless", "--json", "--duration", str(options.seconds),
+                     "--record", folder / "session", "--device", f"script:{path}", "--camera",
+                     "ros2:/far/depth/image_raw/" + TOPICS[options.way] + "wait=30s"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+        if options.down:
+            down_at, seconds = (float(value) for value in options.down.split(":"))
+            while hand.poll() is None and not list(folder.glob("session/*.mcap")):
+                time.sleep(0.01)
+            link.go_down(time.monotonic() + down_at, seconds)
+        _, said = hand.communicate()
+        server.send_signal(signal.SIGINT)
+        server.communicate()
+        if hand.returncode != 0:
+            sys.exit(f"poor_link: the session failed: {said.strip()}")
+        ticks = ticks_of(folder / "session")
+    start = ticks[0].t
     up = start + (down_at + seconds if options.down else LANDING)
     if options.check:
-        felt = sum(tick[2] > LEAST_FELT for tick in ticks if tick[0] > up)
-        if felt < FELT_FOR or ticks[-1][4] < 10:
-            sys.exit(f"poor_link: {ticks[-1][4]:.0f} images came, a force in {felt} ticks since "
-                     "the link is up")
-    pressed = [tick for tick in ticks if tick[0] - start > LANDING]
-    forces = [tick[2] for tick in pressed]
-    new = sorted(1e3 * tick[3] for before, tick in zip(pressed, pressed[1:]) if tick[4] > before[4])
-    ages = sorted(1e3 * tick[3] for tick in pressed)
+        felt = sum(tick.force_z > LEAST_FELT for tick in ticks if tick.t > up)
+        if felt < FELT_FOR or ticks[-1].frame_number < 10:
+            sys.exit(f"poor_link: {ticks[-1].frame_number:.0f} images came, a force in {felt} "
+                     "ticks since the link is up")
+    pressed = [tick for tick in ticks if tick.t - start > LANDING]
+    forces = [tick.force_z for tick in pressed]
+    new = sorted(1e3 * tick.frame_age for before, tick in zip(pressed, pressed[1:])
+                 if tick.frame_number > before.frame_number)
+    ages = sorted(1e3 * tick.frame_age for tick in pressed)
     steps = [abs(b - a) for a, b in zip(forces, forces[1:])]
     usual = statistics.median(forces)
-    frames = (pressed[-1][4] - pressed[0][4]) / (pressed[-1][0] - pressed[0][0])
+    frames = ((pressed[-1].frame_number - pressed[0].frame_number)
+              / (pressed[-1].t - pressed[0].t))
     without = sum(force < 0.2 * usual for force in forces)
-    back = None
-    if options.down:
-        later = [tick[0] for tick in ticks if tick[0] > up and tick[2] > 0.8 * usual]
-        back = later[0] - up if later else math.inf
-    if sum(int(tick[5]) >> STALLED & 1 for tick in pressed):
+    later = (tick.t - up for tick in ticks if tick.t > up and tick.force_z > 0.8 * usual)
+    back = f"{next(later, math.inf):.2f} s" if options.down else ""
+    if sum(int(tick.safety) >> STALLED & 1 for tick in pressed):
         if options.table and again > 0:
             return measure(options, program, again - 1)
         print("poor_link: a busy machine: the session's own ticks came late", file=sys.stderr)
@@ -230,7 +219,7 @@ def measure(options, program, again=5):
             "p99 ": f"{new[len(new) * 99 // 100]:.1f} ms", "force": f"{usual:.2f} N",
             "largest step in 1 ms": f"{1e3 * max(steps):.0f} mN",
             "over 20 Hz": f"{1e3 * ripple(forces):.0f} mN", "without force": f"{without} ms",
-            "back after": "" if back is None else f"{back:.2f} s"}
+            "back after": back}
 
 
 # Each way: delay [ms], jitter [ms], loss [%], rate [Mbit/s], cable pulled (at:seconds)

@@ -27,15 +27,25 @@ def _numbers(rows, column, unit=1.0):
     return [float(row[column]) / unit for row in rows]
 
 
-def _curves(axes, rows, x, y, units=(1.0, 1.0), style="-", reference=None, reference_style="--"):
-    """A curve a method, and in grey the column `reference`, (name, x, y), that they share."""
-    for name, x_of, y_of in reference or ():
+def _curves(axes, rows, x, y, units=(1.0, 1.0), style="-", reference=(), reference_style="--",
+            **labels):
+    """A curve a method, and in grey the columns `reference`, (name, x, y), that they share."""
+    for name, x_of, y_of in reference:
         first = _of(rows, method=_methods(rows)[0])
         axes.plot(_numbers(first, x_of, units[0]), _numbers(first, y_of, units[1]),
                   reference_style, color="grey", label=name)
     for method in _methods(rows):
         own = _of(rows, method=method)
         axes.plot(_numbers(own, x, units[0]), _numbers(own, y, units[1]), style, label=method)
+    axes.set(**labels)
+
+
+def _drawn(*curves):
+    """A figure with a panel for each of what _curves takes."""
+    def figure(rows, panels):
+        for axes, of_panel in zip(panels(len(curves)), curves):
+            _curves(axes, rows, **of_panel)
+    return figure
 
 
 def _groups(axes, rows, group, value, **labels):
@@ -49,19 +59,27 @@ def _groups(axes, rows, group, value, **labels):
     axes.figure.set_figheight(max(axes.figure.get_figheight(), 1.5 + 0.2 * len(names)))
 
 
-def _flat(rows, panels):
-    height, contact = panels(2)
-    _curves(height, rows, "t", "proxy_y", reference=[("HIP", "t", "hip_y")])
-    _curves(contact, rows, "t", "contact_y", (1.0, 1e-3))
-    height.set(xlabel="time [s]", ylabel="height y [m]")
-    contact.set(xlabel="time [s]", ylabel="contact point y [mm]", xlim=(1.2, 3.9), ylim=(-0.2, 0.1))
-
-
-def _single_lift(rows, panels):
-    axes, = panels(1)
-    _curves(axes, rows, "t", "proxy_y", (1.0, R_C), ".-",
-            [("true surface", "t", "true_y"), ("HIP", "t", "hip_y")])
-    axes.set(xlabel="time [s]", ylabel="height y [r_c]")
+_flat = _drawn(
+    dict(x="t", y="proxy_y", reference=[("HIP", "t", "hip_y")], xlabel="time [s]",
+         ylabel="height y [m]"),
+    dict(x="t", y="contact_y", units=(1.0, 1e-3), xlabel="time [s]",
+         ylabel="contact point y [mm]", xlim=(1.2, 3.9), ylim=(-0.2, 0.1)))
+_single_lift = _drawn(
+    dict(x="t", y="proxy_y", units=(1.0, R_C), style=".-", xlabel="time [s]",
+         ylabel="height y [r_c]",
+         reference=[("true surface", "t", "true_y"), ("HIP", "t", "hip_y")]))
+_bound = _drawn(
+    dict(x="noise_rc", y="h_m", units=(1.0, 1e-3), style=".-", xlabel="noise sigma [r_c]",
+         ylabel="thickness h [mm]", reference=[("(23)", "noise_rc", "printed_h_m")]),
+    dict(x="noise_rc", y="e_n", style=".-", xlabel="noise sigma [r_c]",
+         ylabel="normal error e_n", reference=[("(24)", "noise_rc", "printed_e_n")]))
+_corners = _drawn(
+    dict(x="contact_x", y="contact_z", units=(R_C, R_C), xlabel="x [r_c]", ylabel="height [r_c]",
+         reference=[("surface", "contact_x", "true_z")], reference_style=":"))
+_scan = _drawn(
+    dict(x="proxy_y", y="proxy_z", xlabel="along the scan y [m]", ylabel="z [m]",
+         reference=[("surface", "proxy_y", "surface_z"), ("HIP", "hip_y", "hip_z")]),
+    dict(x="hip_y", y="force_n", xlabel="along the scan y [m]", ylabel="force [N]"))
 
 
 def _lift(rows, panels):
@@ -79,32 +97,6 @@ def _lift(rows, panels):
         axes.plot(bound, noises, label="(25)")
         axes.set(title=method, xlabel="acceleration a [r_c/s²]", ylabel="noise sigma [r_c]",
                  xlim=(0, 1400), ylim=(0, 3))
-
-
-def _bound(rows, panels):
-    thickness, error = panels(2)
-    _curves(thickness, rows, "noise_rc", "h_m", (1.0, 1e-3), ".-",
-            [("(23)", "noise_rc", "printed_h_m")])
-    _curves(error, rows, "noise_rc", "e_n", style=".-", reference=[("(24)", "noise_rc",
-                                                                    "printed_e_n")])
-    thickness.set(xlabel="noise sigma [r_c]", ylabel="thickness h [mm]")
-    error.set(xlabel="noise sigma [r_c]", ylabel="normal error e_n")
-
-
-def _corners(rows, panels):
-    axes, = panels(1)
-    _curves(axes, rows, "contact_x", "contact_z", (R_C, R_C),
-            reference=[("surface", "contact_x", "true_z")], reference_style=":")
-    axes.set(xlabel="x [r_c]", ylabel="height [r_c]")
-
-
-def _scan(rows, panels):
-    height, force = panels(2)
-    _curves(height, rows, "proxy_y", "proxy_z",
-            reference=[("surface", "proxy_y", "surface_z"), ("HIP", "hip_y", "hip_z")])
-    _curves(force, rows, "hip_y", "force_n")
-    height.set(xlabel="along the scan y [m]", ylabel="z [m]")
-    force.set(xlabel="along the scan y [m]", ylabel="force [N]")
 
 
 def _aims(rows, panels):

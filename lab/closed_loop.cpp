@@ -65,8 +65,7 @@ class StraightLoop final : public TouchLoop {
   Felt tick(double t) override {
     const Vec3 hip = held_.device->read(t).position;
     const Tick tick = method_->tick(hip, t);
-    Felt felt{
-        t, hip, tick.force, tick.force, tick.surface_velocity, tick.surface_motion, held_.speed()};
+    Felt felt{t, hip, tick.force, tick.force, tick.surface_velocity, held_.speed()};
     const double magnitude = felt.force.norm();
     if (magnitude > held_.peak_force) felt.force *= held_.peak_force / magnitude;
     held_.device->write(felt.force, t);
@@ -99,7 +98,6 @@ class SafeLoop final : public TouchLoop {
             done.force,
             done.tick.force,
             done.tick.surface_velocity,
-            done.tick.surface_motion,
             held_.speed(),
             done.safety};
   }
@@ -118,14 +116,20 @@ HeldDevice on_path(const HipPath& path) {
           [] { return 0.0; }};
 }
 
-HeldDevice in_hand(const HipPath& path, const Grip& grip, const DevicePreset& device,
-                   std::uint64_t seed) {
+std::unique_ptr<SimulatedHand> simulated_hand(const HipPath& path, const Grip& grip,
+                                              const DevicePreset& device, std::uint64_t seed) {
   auto hand = std::make_unique<SimulatedHand>(path, HandModel{.mass = grip.mass,
                                                               .stiffness = grip.stiffness,
                                                               .damping = grip.damping,
                                                               .seed = seed,
                                                               .body = device.body});
   hand->set_device(device);
+  return hand;
+}
+
+HeldDevice in_hand(const HipPath& path, const Grip& grip, const DevicePreset& device,
+                   std::uint64_t seed) {
+  auto hand = simulated_hand(path, grip, device, seed);
   auto speed = speed_of(*hand, grip.mass + device.body.mass);
   return {std::move(hand), device.limits.max_force, std::move(speed)};
 }

@@ -11,6 +11,10 @@
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/servo/cycle.hpp"
 
+namespace palpate {
+class SimulatedHand;
+}
+
 namespace palpate::lab {
 
 /// A device in somebody's hand.
@@ -26,6 +30,9 @@ HeldDevice on_path(const HipPath& path);
 
 /// A simulated hand that wants to follow a path and yields to the force.
 /// @param seed  of its tremor
+std::unique_ptr<SimulatedHand> simulated_hand(const HipPath& path, const Grip& grip,
+                                              const DevicePreset& device, std::uint64_t seed);
+/// The same as it is held.
 HeldDevice in_hand(const HipPath& path, const Grip& grip, const DevicePreset& device,
                    std::uint64_t seed);
 
@@ -35,14 +42,13 @@ HeldDevice let_go(const HipPath& path, const DevicePreset& device, double from);
 
 /// A tick as the hand has it.
 struct Felt {
-  double t = 0.0;                      ///< [s]
-  Vec3 hip = Vec3::Zero();             ///< [m] world, as the device reads it
-  Vec3 force = Vec3::Zero();           ///< [N] world, that the device is told to give
-  Vec3 asked = Vec3::Zero();           ///< [N] world, that the method asks for
-  double surface_velocity = 0.0;       ///< [m/s] as the method has it
-  Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world, as the method has it
-  double speed = 0.0;                  ///< [m/s] of the handle
-  std::uint32_t safety = 0;            ///< SafetyFlag bits; 0 without a chain
+  double t = 0.0;                 ///< [s]
+  Vec3 hip = Vec3::Zero();        ///< [m] world, as the device reads it
+  Vec3 force = Vec3::Zero();      ///< [N] world, that the device is told to give
+  Vec3 asked = Vec3::Zero();      ///< [N] world, that the method asks for
+  double surface_velocity = 0.0;  ///< [m/s] as the method has it
+  double speed = 0.0;             ///< [m/s] of the handle
+  std::uint32_t safety = 0;       ///< SafetyFlag bits; 0 without a chain
 };
 
 /// The loop of a method and a held device, at the rate of the scenario's ticks.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "lab/closed_loop.hpp"
 #include "palpate/io/devices/simulated_hand.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/teleop/set_point.hpp"
@@ -122,11 +123,11 @@ class Palpate final : public Coupling {
   }
   static Parameters guard_parameters(const TeleopCase& one) {
     Parameters parameters = one.parameters;
-    set_parameter(parameters, "r_c", SimulatedTool::radius + one.robot.margin);
+    set_parameter(parameters, "r_c", SimulatedTool::radius + SetPointOptions{}.margin);
     return parameters;
   }
   static SetPointOptions for_tool(const TeleopCase& one) {
-    SetPointOptions options = one.robot;
+    SetPointOptions options;
     if (one.fixtures) options.fixtures = robot_fixtures(*one.fixtures);
     options.tool_radius = SimulatedTool::radius;
     options.lag = SimulatedTool::lag();
@@ -329,14 +330,10 @@ const std::vector<std::string_view>& teleop_ways() {
 
 void play_teleop(const TeleopScene& scene, const TeleopCase& one,
                  const std::function<void(const TeleopTick&)>& on_tick) {
-  const DevicePreset& device = device_preset(one.device);
-  const Grip& grip = grip_preset(one.grip);
-  SimulatedHand hand(scene.hand, HandModel{.mass = grip.mass,
-                                           .stiffness = grip.stiffness,
-                                           .damping = grip.damping,
-                                           .seed = one.seed,
-                                           .body = device.body});
-  hand.set_device(device);
+  const DevicePreset& device = device_preset("touch");
+  const Grip& grip = grip_preset("light");
+  const auto held = simulated_hand(scene.hand, grip, device, one.seed);
+  SimulatedHand& hand = *held;
   const Vec3 begin = scene.hand.at(scene.hand.first_time());
   SimulatedTool tool(begin, [&scene](const Vec3& place, double t) -> SimulatedTool::Surface {
     const TruePoint at = scene.truth(place, t);

@@ -96,9 +96,6 @@ struct TeleopCase {
   std::string_view way;  ///< one of teleop_ways()
   LinkQuality up = {}, down = {};
   Parameters parameters = {};
-  std::string_view device = "touch";
-  std::string_view grip = "light";
-  SetPointOptions robot = {};  ///< feeler, margin and share of the force; the rest is the tool's
   std::uint64_t seed = 1;
   std::shared_ptr<const FixtureSet> fixtures = {};  ///< at both ends
   /// [s] from when on nothing of an end runs any more

@@ -65,39 +65,65 @@ void check_families(const ExperimentOptions& options, std::string_view what,
   }
 }
 
-AimTable::AimTable(std::vector<std::string> labels, std::vector<std::string> methods)
-    : methods_(std::move(methods)), met_(methods_.size(), 0) {
-  scores_.columns = std::move(labels);
-  scores_.columns.emplace_back("aim");
-  scores_.columns.insert(scores_.columns.end(), methods_.begin(), methods_.end());
+Column shown(std::string title, std::vector<std::string_view> columns, std::string_view format,
+             double unit, double (*of)(std::span<const double>)) {
+  return {std::move(title), [=, columns = std::move(columns)](const Table& group) {
+            std::string text;
+            for (const std::string_view column : columns)
+              add_to_list(text,
+                          fmt::format(fmt::runtime(format), unit * of(group.numbers(column))));
+            return text;
+          }};
 }
 
-void AimTable::add(std::vector<std::string> labels, std::optional<double> aim,
-                   const std::vector<std::optional<double>>& values) {
-  std::vector<std::string> line = std::move(labels);
-  line.push_back(aim ? fmt::format("<= {:g}", *aim) : "-");
-  aims_ += aim ? 1 : 0;
-  for (std::size_t m = 0; m < methods_.size(); ++m) {
-    const bool missed = aim && !(values[m] && *values[m] <= *aim);
-    met_[m] += aim && !missed ? 1 : 0;
-    line.push_back((values[m] ? fmt::format("{:.3g}", *values[m]) : "-") + (missed ? " *" : ""));
+Scores scores_of(const std::vector<Table>& groups, const std::vector<std::string_view>& keys,
+                 const std::vector<Column>& columns, std::string note) {
+  Scores scores{.columns = {keys.begin(), keys.end()}, .rows = {}, .note = std::move(note)};
+  for (const Column& column : columns) scores.columns.push_back(column.title);
+  for (const Table& group : groups) {
+    std::vector<std::string>& line = scores.rows.emplace_back();
+    for (const std::string_view key : keys) line.push_back(group.text(0, key));
+    for (const Column& column : columns) line.push_back(column.text(group));
   }
-  scores_.rows.push_back(std::move(line));
-}
-
-Scores AimTable::scores(std::string note) const {
-  Scores scores = scores_;
-  std::vector<std::string> line(scores.columns.size() - methods_.size() - 1);
-  line.front() = "aims met";
-  line.push_back(fmt::format("{}", aims_));
-  for (const int count : met_) line.push_back(fmt::format("{}", count));
-  scores.rows.push_back(std::move(line));
-  scores.note = std::move(note);
   return scores;
 }
 
-std::string measure_text(std::string_view name, std::string_view unit) {
-  return unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit);
+Scores scores_by(const Table& table, const std::vector<std::string_view>& keys,
+                 const std::vector<Column>& columns, std::string note) {
+  return scores_of(table.by(keys), keys, columns, std::move(note));
+}
+
+Scores aim_scores(const Table& table, const std::vector<AimLine>& lines, std::string note,
+                  double exact) {
+  const std::vector<Table> methods = table.by({"method"});
+  Scores scores{.columns = {}, .rows = {}, .note = std::move(note)};
+  for (const auto& [column, text] : lines.front().where) scores.columns.emplace_back(column);
+  std::vector<std::string> last(scores.columns.size());
+  last.front() = "aims met";
+  scores.columns.emplace_back("aim");
+  for (const Table& method : methods) scores.columns.push_back(method.text(0, "method"));
+  std::vector<int> met(methods.size(), 0);
+  int aims = 0;
+  for (const AimLine& one : lines) {
+    if (table.numbers("value", {one.where.front()}).empty()) continue;
+    std::vector<std::string>& line = scores.rows.emplace_back();
+    for (const auto& [column, text] : one.where) line.emplace_back(text);
+    if (!one.unit.empty()) line.back() += fmt::format(" [{}]", one.unit);
+    line.push_back(one.aim ? fmt::format("<= {:g}", *one.aim) : "-");
+    aims += one.aim ? 1 : 0;
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      const std::vector<double> values = methods[m].numbers("value", one.where);
+      const bool missed = one.aim && !(first(values) <= *one.aim);  // as NaN, of none
+      met[m] += one.aim && !missed ? 1 : 0;
+      line.push_back(values.empty() ? "-"
+                                    : fmt::format("{:.3g}", values[0] < exact ? 0.0 : values[0]));
+      if (missed) line.back() += " *";
+    }
+  }
+  last.push_back(std::to_string(aims));
+  for (const int count : met) last.push_back(std::to_string(count));
+  scores.rows.push_back(std::move(last));
+  return scores;
 }
 
 }  // namespace palpate::lab

@@ -102,28 +102,36 @@ std::vector<Cell> by_method(const Experiment& experiment, const ExperimentOption
 void check_families(const ExperimentOptions& options, std::string_view what,
                     std::span<const std::string_view> known);
 
-/// Scores of a bench that measures methods beside aims, which are upper bounds: a row a measure, a
-/// column a method. What misses its aim is marked, and the last row counts the aims met.
-class AimTable {
- public:
-  /// @param labels  names of the columns before that of the aim
-  AimTable(std::vector<std::string> labels, std::vector<std::string> methods);
-
-  [[nodiscard]] const std::vector<std::string>& methods() const { return methods_; }
-  /// A row. @param labels  one a column before the aim's
-  /// @param values  one a method; none where there is nothing to measure, which misses any aim
-  void add(std::vector<std::string> labels, std::optional<double> aim,
-           const std::vector<std::optional<double>>& values);
-  [[nodiscard]] Scores scores(std::string note) const;
-
- private:
-  std::vector<std::string> methods_;
-  Scores scores_;
-  std::vector<int> met_;  // aims, by each method
-  int aims_ = 0;
+/// A column of scores: its title, and what it says of a group of the CSV's rows.
+struct Column {
+  std::string title;
+  std::function<std::string(const Table& group)> text;
 };
 
-/// A measure as the table names it. @param unit  empty where it has none
-std::string measure_text(std::string_view name, std::string_view unit);
+/// Numbers of the CSV, those of several columns side by side.
+/// @param format  of a number, such as "{:.2f}"  @param unit  by which it is multiplied
+/// @param of      what stands for the numbers of a group's rows
+Column shown(std::string title, std::vector<std::string_view> columns, std::string_view format,
+             double unit = 1.0, double (*of)(std::span<const double>) = first);
+
+/// A line for each group of rows: the text that they share in the columns `keys`, and `columns`.
+Scores scores_of(const std::vector<Table>& groups, const std::vector<std::string_view>& keys,
+                 const std::vector<Column>& columns, std::string note);
+/// The same of the groups by these keys.
+Scores scores_by(const Table& table, const std::vector<std::string_view>& keys,
+                 const std::vector<Column>& columns, std::string note);
+
+/// A line of aim_scores.
+struct AimLine {
+  Where where;                ///< the columns that tell it, the last of them "measure"
+  std::string_view unit;      ///< of the measure; may be empty
+  std::optional<double> aim;  ///< upper bound of the column "value"; none: it is only shown
+};
+/// Scores of a bench that measures methods beside aims: a line a measure, a column a method. What
+/// misses its aim, or cannot be measured, is marked, and the last line counts the aims met.
+/// Scenes (the first column of a line) that were not played are left out.
+/// @param exact  what is below counts as 0
+Scores aim_scores(const Table& table, const std::vector<AimLine>& lines, std::string note,
+                  double exact = 0.0);
 
 }  // namespace palpate::lab

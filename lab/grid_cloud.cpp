@@ -54,15 +54,12 @@ void add_correlated_noise(std::vector<Vec3>& points, int columns, int rows, doub
 }  // namespace
 
 std::unique_ptr<PointCloud> GridCloud::capture(std::uint64_t frame, double lift) const {
-  // The grid is fixed in the world; what moves with the centre is which part of it is made.
-  const auto first = [this](double centre, double half) {
-    return static_cast<int>(std::ceil((centre - half) / spacing));
-  };
+  const auto first = [this](double half) { return static_cast<int>(std::ceil(-half / spacing)); };
   const auto count = [this](double half) { return static_cast<int>(2.0 * half / spacing) + 1; };
   const int columns = count(half_x);
   const int rows = count(half_y);
-  const int i0 = first(centre_x, half_x);
-  const int j0 = first(centre_y, half_y);
+  const int i0 = first(half_x);
+  const int j0 = first(half_y);
   Surface surface;
   surface.columns = columns;
   surface.rows = rows;
@@ -92,7 +89,7 @@ std::unique_ptr<PointCloud> GridCloud::capture(std::uint64_t frame, double lift)
   if (sigma > 0.0 && noise == Noise::white) add_point_noise(points, sigma, seed, frame);
   if (sigma > 0.0 && noise == Noise::correlated)
     add_correlated_noise(points, columns, rows, sigma, 5.0, seed * 0x9E3779B97F4A7C15ULL + frame);
-  return std::make_unique<PointCloud>(std::move(surface), Vec3(centre_x, centre_y, 10.0));
+  return std::make_unique<PointCloud>(std::move(surface), Vec3(0.0, 0.0, 10.0));
 }
 
 }  // namespace palpate::lab

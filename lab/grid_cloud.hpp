@@ -7,6 +7,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "lab/experiment.hpp"
 #include "lab/method.hpp"
@@ -21,10 +22,8 @@ namespace palpate::lab {
 struct GridCloud {
   std::function<double(double x, double y)> height = [](double, double) { return 0.0; };  ///< [m]
   double spacing = 1.5e-3;     ///< [m] 0.3 r_c, Table 2
-  double half_x = 0.06;        ///< [m] extent to each side of `centre_x`; points farther than this
+  double half_x = 0.06;        ///< [m] extent to each side of the origin; points farther than this
   double half_y = 0.06;        ///<     from the proxy can't touch it and are left out
-  double centre_x = 0.0;       ///< [m]
-  double centre_y = 0.0;       ///< [m]
   double sigma = 0.0;          ///< [m] standard deviation of each coordinate (white), or of the
                                ///<     height (correlated)
   Noise noise = Noise::white;  ///< correlated: over 5 points, exp(-(d / 5 spacings)^2)
@@ -42,6 +41,14 @@ inline GridCloud level_grid(double r_c, double half) {
   grid.spacing = 0.3 * r_c;
   grid.half_x = grid.half_y = half;
   return grid;
+}
+
+/// A grid at rest under a hand. @param grid  must outlive it  @param hip  [m] at a time [s]
+inline Scenario over_grid(const GridCloud& grid, double duration,
+                          std::function<Vec3(double t)> hip) {
+  return {.duration = duration,
+          .cloud = [&grid](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
+          .hip = std::move(hip)};
 }
 
 /// A plane without noise that goes up and down by 20 mm once a second, for 4 s at 30 Hz, under a

@@ -8,7 +8,8 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <set>
+#include <map>
+#include <numeric>
 
 #include "palpate/kernel/core/error.hpp"
 
@@ -73,32 +74,58 @@ double Table::number(std::size_t row, std::string_view column) const {
   return value;
 }
 
-bool Table::is(std::size_t row, Where where) const {
+bool Table::is(std::size_t row, const Where& where) const {
   return std::all_of(where.begin(), where.end(),
                      [&](const auto& wanted) { return text(row, wanted.first) == wanted.second; });
 }
 
-std::vector<std::size_t> first_rows(const Table& table,
-                                    const std::function<std::string(std::size_t row)>& key) {
-  std::vector<std::size_t> rows;
-  std::set<std::string> seen;
-  for (std::size_t row = 0; row < table.rows(); ++row)
-    if (seen.insert(key(row)).second) rows.push_back(row);
-  return rows;
+Table Table::where(const Where& where) const {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t row = 0; row < rows_.size(); ++row)
+    if (is(row, where)) rows.push_back(rows_[row]);
+  return {*this, std::move(rows)};
 }
 
-std::vector<std::string> methods_in(const Table& table) {
-  std::vector<std::string> methods;
-  for (const std::size_t row :
-       first_rows(table, [&](std::size_t any) { return table.text(any, "method"); }))
-    methods.push_back(table.text(row, "method"));
-  return methods;
+std::vector<Table> Table::by(const std::vector<std::string_view>& keys) const {
+  std::vector<Table> groups;
+  std::map<std::vector<std::string>, std::size_t> known;
+  for (std::size_t row = 0; row < rows_.size(); ++row) {
+    std::vector<std::string> texts;
+    for (const std::string_view key : keys) texts.push_back(text(row, key));
+    const auto [group, is_new] = known.emplace(std::move(texts), groups.size());
+    if (is_new) groups.push_back({*this, {}});
+    groups[group->second].rows_.push_back(rows_[row]);
+  }
+  return groups;
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
+std::vector<std::string> texts_in(const Table& table, std::string_view column) {
+  std::vector<std::string> texts;
+  for (const Table& group : table.by({column})) texts.push_back(group.text(0, column));
+  return texts;
+}
+
+namespace {
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+double first(std::span<const double> values) { return values.empty() ? none : values.front(); }
+
+double sum(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+double largest(std::span<const double> values) {
+  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+}
+
+double median(std::span<const double> values) {
+  if (values.empty()) return none;
+  std::vector<double> sorted(values.begin(), values.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
   return *middle;
 }
 

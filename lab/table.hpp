@@ -4,8 +4,7 @@
 #include <concepts>
 #include <cstddef>
 #include <filesystem>
-#include <functional>
-#include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,7 +13,7 @@
 namespace palpate::lab {
 
 /// Columns and the text that each has in the rows that are meant.
-using Where = std::initializer_list<std::pair<std::string_view, std::string_view>>;
+using Where = std::vector<std::pair<std::string_view, std::string_view>>;
 
 std::vector<std::string> lines_of(const std::string& text);
 
@@ -38,13 +37,20 @@ class Table {
     }
     return values;
   }
-  [[nodiscard]] std::vector<double> numbers(std::string_view column, Where where) const {
+  [[nodiscard]] std::vector<double> numbers(std::string_view column,
+                                            const Where& where = {}) const {
     return numbers(column, [&](std::size_t row) { return is(row, where); });
   }
   /// Are all of these in the row?
-  [[nodiscard]] bool is(std::size_t row, Where where) const;
+  [[nodiscard]] bool is(std::size_t row, const Where& where) const;
+  /// The rows that have all of these.
+  [[nodiscard]] Table where(const Where& where) const;
+  /// The rows in groups that have the same text in all `keys`, in the order of their first rows.
+  [[nodiscard]] std::vector<Table> by(const std::vector<std::string_view>& keys) const;
 
  private:
+  Table(const Table& of, std::vector<std::vector<std::string>> rows)
+      : subject_(of.subject_), columns_(of.columns_), rows_(std::move(rows)) {}
   [[nodiscard]] std::size_t index(std::string_view column) const;
 
   std::string subject_;
@@ -52,15 +58,17 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// The first row of each key, in their order.
-std::vector<std::size_t> first_rows(const Table& table,
-                                    const std::function<std::string(std::size_t row)>& key);
+/// The texts of a column, each once, in the order of their first rows.
+std::vector<std::string> texts_in(const Table& table, std::string_view column);
 
-/// The methods of a table's column "method", in the order of their first rows.
-std::vector<std::string> methods_in(const Table& table);
-
+// What stands for the numbers of a column.
+/// NaN of none.
+double first(std::span<const double> values);
+double sum(std::span<const double> values);
+/// 0 of none.
+double largest(std::span<const double> values);
 /// The upper one of the two in the middle of an even number; NaN of none.
-double median(std::vector<double> values);
+double median(std::span<const double> values);
 
 /// A field of a CSV: numbers in the shortest form that reads back to the same value.
 std::string csv_field(double number);

@@ -8,8 +8,6 @@
 #include <numbers>
 #include <string>
 
-#include <fmt/format.h>
-
 #include "lab/experiment.hpp"
 #include "lab/method.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
@@ -137,22 +135,14 @@ std::vector<Cell> cameras_cells(const Experiment& experiment, const ExperimentOp
 }
 
 Scores cameras_scores(const Table& table) {
-  Scores scores{.columns = {"rig", "method", "first", "second", "both [N rms]", "weighed", "steps"},
-                .rows = {},
-                .note =
-                    "Force of a hand at rest with each of two cameras alone and with both; what "
-                    "two independent estimates have, weighed by their variances; the largest "
-                    "steps from tick to tick [N]. Pooled over the seeds."};
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto number = [&](std::string_view column) { return table.number(row, column); };
-    scores.rows.push_back(
-        {table.text(row, "rig"), table.text(row, "method"), fmt::format("{:.4f}", number("first")),
-         fmt::format("{:.4f}", number("second")), fmt::format("{:.4f}", number("both")),
-         fmt::format("{:.4f}", number("weighed")),
-         fmt::format("{:.3f}, {:.3f}, {:.3f}", number("first_step"), number("second_step"),
-                     number("both_step"))});
-  }
-  return scores;
+  return scores_by(
+      table, {"rig", "method"},
+      {shown("first", {"first"}, "{:.4f}"), shown("second", {"second"}, "{:.4f}"),
+       shown("both [N rms]", {"both"}, "{:.4f}"), shown("weighed", {"weighed"}, "{:.4f}"),
+       shown("steps", {"first_step", "second_step", "both_step"}, "{:.3f}")},
+      "Force of a hand at rest with each of two cameras alone and with both; what two independent "
+      "estimates have, weighed by their variances; the largest steps from tick to tick [N]. Pooled "
+      "over the seeds.");
 }
 
 }  // namespace

@@ -138,29 +138,16 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   return cells;
 }
 
-// A row a measure and loop.
 Scores feel_scores(const Table& table) {
-  AimTable scores({"scene", "loop", "measure"}, methods_in(table));
-  for (const FeelScene& scene : scenes()) {
-    for (const Measure& measure : scene.measures) {
-      for (const std::string_view loop : measure.loops) {
-        std::vector<std::optional<double>> values;
-        for (const std::string& method : scores.methods()) {
-          const std::vector<double> rows = table.numbers("value", {{"method", method},
-                                                                   {"scene", scene.name},
-                                                                   {"loop", loop},
-                                                                   {"measure", measure.name}});
-          constexpr double exact = 1e-6;  // of any unit here: rounding
-          if (!rows.empty()) values.emplace_back(rows.front() < exact ? 0.0 : rows.front());
-        }
-        if (values.empty()) continue;
-        values.resize(scores.methods().size());  // all methods play a scene
-        scores.add({scene.name, std::string(loop), measure_text(measure.name, measure.unit)},
-                   measure.aim, values);
-      }
-    }
-  }
-  return scores.scores("* misses the aim. Measures: docs/feel.md.");
+  std::vector<AimLine> lines;
+  for (const FeelScene& scene : scenes())
+    for (const Measure& measure : scene.measures)
+      for (const std::string_view loop : measure.loops)
+        lines.push_back({{{"scene", scene.name}, {"loop", loop}, {"measure", measure.name}},
+                         measure.unit,
+                         measure.aim});
+  constexpr double exact = 1e-6;  // of any unit here: rounding
+  return aim_scores(table, lines, "* misses the aim. Measures: docs/feel.md.", exact);
 }
 
 }  // namespace

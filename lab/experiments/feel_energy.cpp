@@ -10,7 +10,6 @@
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
-#include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/servo/passivity_observer.hpp"
 
 namespace palpate::lab {
@@ -95,10 +94,9 @@ FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOpt
   std::vector<std::vector<Counted>> counted(contestants.size(),
                                             std::vector<Counted>(holdings.size()));
   for (int k = 0; k < options.repeats; ++k) {
-    const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    const auto camera = open_synthetic_camera(
-        Uri("synthetic:plane?" + camera_options(distance, 0.3, sensor, seed)));
-    const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
+    const std::uint64_t seed = options.seed_of(k);
+    const FeelStage stage("synthetic:plane?" + camera_options(distance, 0.3, sensor, seed));
+    const Truth truth = truth_of(stage.scene);
     std::vector<Presses> hands;
     for (int i = 0; i < std::max(options.phases / 4, 1); ++i)
       hands.push_back(presses(1000 * seed + static_cast<std::uint64_t>(i)));
@@ -123,13 +121,8 @@ FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOpt
           add(contestant.make({options.parameters, truth}));
       }
     }
-    play_to(
-        loops,
-        {.frame_rate = camera->setup().frame_rate,
-         .duration = duration + 0.01,
-         .cloud = [&](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
-         .hip = nullptr},
-        [&](std::size_t loop, const Felt& felt) { meters[loop].add(felt); });
+    play_to(loops, stage.scenario(duration + 0.01),
+            [&](std::size_t loop, const Felt& felt) { meters[loop].add(felt); });
     const std::size_t group = 1 + contestants.size();
     for (std::size_t i = 0; i < hands.size(); ++i) {
       const std::vector<double>& straight = meters[i * group].made;

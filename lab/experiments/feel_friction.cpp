@@ -7,7 +7,7 @@
 
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
-#include "palpate/io/sources/synthetic_camera.hpp"
+#include "lab/statistics.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -16,17 +16,12 @@ namespace {
 void play(const std::vector<OwnMethod>& contestants, const Parameters& parameters,
           const std::string& camera_uri, double seconds, const std::function<HeldDevice()>& held,
           const std::function<void(std::size_t contestant, const Felt&)>& on_tick) {
-  const auto camera = open_synthetic_camera(Uri(camera_uri));
-  const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
+  const FeelStage stage(camera_uri);
+  const Truth truth = truth_of(stage.scene);
   std::vector<std::unique_ptr<TouchLoop>> loops;
   for (const OwnMethod& contestant : contestants)
     loops.push_back(straight_loop(contestant.make({parameters, truth}), held()));
-  play_to(loops,
-          {.frame_rate = camera->setup().frame_rate,
-           .duration = seconds,
-           .cloud = [&](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
-           .hip = nullptr},
-          on_tick);
+  play_to(loops, stage.scenario(seconds), on_tick);
 }
 
 Parameters with_friction(Parameters parameters, double coefficient) {
@@ -37,15 +32,9 @@ Parameters with_friction(Parameters parameters, double coefficient) {
 }  // namespace
 
 FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOptions& options) {
-  constexpr double press = 0.008;  // [m]
-  constexpr double from = 1.2;     // [s] sliding, after the first tenth
-  constexpr double half = 0.1;     // [m] of the way
-  const HipPath hand({{0.0, {-half, 0.0, 0.060}},
-                      {0.5, {-half, 0.0, -press}},
-                      {1.0, {-half, 0.0, -press}},
-                      {3.0, {half, 0.0, -press}}});
-  FeelFigures figures;
-  std::vector<double> worst(contestants.size(), 0.0);
+  constexpr double from = 1.2;  // [s] sliding, after the first tenth
+  const HipPath hand = sliding_hand();
+  FeelRepeats repeats;
   for (const double coefficient : {0.1, 0.3, 0.6, 1.0}) {
     const Parameters parameters = with_friction(options.parameters, coefficient);
     // What the model says of the speed of 0.1 m/s.
@@ -54,12 +43,11 @@ FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOption
     const double kinetic = coefficient * (friction.kinetic_share + (1.0 - friction.kinetic_share) *
                                                                        std::exp(-faster * faster));
     for (int k = 0; k < options.repeats; ++k) {
-      const auto seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
       std::vector<double> along(contestants.size(), 0.0);
       std::vector<double> normal(contestants.size(), 0.0);
       play(
           contestants, parameters,
-          fmt::format("synthetic:plane?distance=0.7m&sensor=d4xx&seed={}", seed), 3.0,
+          fmt::format("synthetic:plane?distance=0.7m&sensor=d4xx&seed={}", options.seed_of(k)), 3.0,
           [&] { return on_path(hand); },
           [&](std::size_t i, const Felt& felt) {
             if (felt.t < from) return;
@@ -68,13 +56,12 @@ FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOption
           });
       for (std::size_t i = 0; i < contestants.size(); ++i) {
         const double ratio = normal[i] > 0.0 ? along[i] / normal[i] : 0.0;
-        worst[i] = std::max(worst[i], 100.0 * std::abs(ratio / kinetic - 1.0));
+        repeats.add({contestants[i].name, "path"}, "ratio",
+                    100.0 * std::abs(ratio / kinetic - 1.0));
       }
     }
   }
-  for (std::size_t i = 0; i < contestants.size(); ++i)
-    figures.push_back({contestants[i].name, "path", "ratio", worst[i]});
-  return figures;
+  return repeats.figures({{"ratio", largest}});
 }
 
 FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
@@ -99,35 +86,26 @@ FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOpti
   DevicePreset device = device_preset("omega");
   device.body.friction = 0.0;
   const Parameters parameters = with_friction(options.parameters, coefficient);
-  std::vector<double> worst(contestants.size(), 0.0);
+  FeelRepeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
-    const auto seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    struct Mean {
-      double sum = 0.0;
-      int count = 0;
-      [[nodiscard]] double value() const { return sum / std::max(count, 1); }
-    };
-    std::vector<Mean> first(contestants.size());
-    std::vector<Mean> last(contestants.size());
+    const std::uint64_t seed = options.seed_of(k);
+    std::vector<std::vector<double>> first(contestants.size());  // [m] along, in the first second
+    std::vector<std::vector<double>> last(contestants.size());
     play(
         contestants, parameters,
         fmt::format("synthetic:plane?{}&stroke={}", camera_options(0.7, 0.3, "d4xx", seed), stroke),
         seconds, [&] { return in_hand(hand, grip, device, seed); },
         [&](std::size_t i, const Felt& felt) {
-          Mean* mean = felt.t >= seconds - 1.0                               ? &last[i]
-                       : felt.t >= seconds - 11.0 && felt.t < seconds - 10.0 ? &first[i]
-                                                                             : nullptr;
-          if (mean == nullptr) return;
-          mean->sum += felt.hip.x();
-          ++mean->count;
+          if (felt.t >= seconds - 1.0)
+            last[i].push_back(felt.hip.x());
+          else if (felt.t >= seconds - 11.0 && felt.t < seconds - 10.0)
+            first[i].push_back(felt.hip.x());
         });
     for (std::size_t i = 0; i < contestants.size(); ++i)
-      worst[i] = std::max(worst[i], 1e3 * std::abs(last[i].value() - first[i].value()));
+      repeats.add({contestants[i].name, "light"}, "drift",
+                  1e3 * std::abs(mean(last[i]) - mean(first[i])));
   }
-  FeelFigures figures;
-  for (std::size_t i = 0; i < contestants.size(); ++i)
-    figures.push_back({contestants[i].name, "light", "drift", worst[i]});
-  return figures;
+  return repeats.figures({{"drift", largest}});
 }
 
 }  // namespace palpate::lab

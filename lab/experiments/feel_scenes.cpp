@@ -30,25 +30,6 @@ constexpr std::string_view chain = "chain";  // the light grip, or the free hand
 
 const DevicePreset& touch() { return device_preset("touch"); }
 
-// What a camera shows, and the truth about it.
-struct Stage {
-  explicit Stage(const std::string& uri)
-      : camera(open_synthetic_camera(Uri(uri))), scene(std::make_shared<Scene>(camera->scene())) {}
-  Stage(const std::shared_ptr<const Scene>& its_scene, const std::string& options)
-      : camera(camera_before(*its_scene, options)), scene(its_scene) {}
-
-  [[nodiscard]] Scenario scenario(double duration) const {
-    return {
-        .frame_rate = camera->setup().frame_rate,
-        .duration = duration,
-        .cloud = [this](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
-        .hip = nullptr};
-  }
-
-  std::shared_ptr<SyntheticCamera> camera;
-  std::shared_ptr<const Scene> scene;
-};
-
 // The loops of all contestants that touch one scene, and beside each the same loop of the ruler, a
 // sphere on the true surface: what an exact surface with the same spring would give.
 class Loops {
@@ -100,49 +81,6 @@ class Loops {
   Parameters parameters_;
   Truth truth_;
   std::vector<std::size_t> rulers_;
-};
-
-// Values of one measure over the repeats, for every loop.
-class Repeats {
- public:
-  void add(const std::pair<std::string, std::string_view>& name, std::string_view measure,
-           double value) {
-    for (Entry& entry : entries_) {
-      if (entry.name == name && entry.measure == measure) {
-        entry.values.push_back(value);
-        return;
-      }
-    }
-    entries_.push_back({name, measure, {value}});
-  }
-
-  void median_of(std::string_view measure, std::string_view as, FeelFigures& figures) const {
-    for (const Entry& entry : entries_) {
-      if (entry.measure != measure) continue;
-      std::vector<double> values = entry.values;
-      std::sort(values.begin(), values.end());
-      const std::size_t half = values.size() / 2;
-      const double median =
-          values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
-      figures.push_back({entry.name.first, entry.name.second, std::string(as), median});
-    }
-  }
-
-  void largest_of(std::string_view measure, std::string_view as, FeelFigures& figures) const {
-    for (const Entry& entry : entries_) {
-      if (entry.measure == measure)
-        figures.push_back({entry.name.first, entry.name.second, std::string(as),
-                           *std::max_element(entry.values.begin(), entry.values.end())});
-    }
-  }
-
- private:
-  struct Entry {
-    std::pair<std::string, std::string_view> name;
-    std::string_view measure;
-    std::vector<double> values;
-  };
-  std::vector<Entry> entries_;
 };
 
 // The force of a loop over a stretch of time.
@@ -202,7 +140,58 @@ HipPath coming_down(double from) {
   return HipPath(std::move(samples));
 }
 
+// Between the two in the middle of an even number.
+double middle_of(std::span<const double> repeats) {
+  std::vector<double> values(repeats.begin(), repeats.end());
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
 }  // namespace
+
+FeelStage::FeelStage(const std::string& uri)
+    : camera(open_synthetic_camera(Uri(uri))), scene(std::make_shared<Scene>(camera->scene())) {}
+
+FeelStage::FeelStage(const std::shared_ptr<const Scene>& its_scene, const std::string& options)
+    : camera(camera_before(*its_scene, options)), scene(its_scene) {}
+
+Scenario FeelStage::scenario(double duration) const {
+  return {
+      .frame_rate = camera->setup().frame_rate,
+      .duration = duration,
+      .cloud = [this](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
+      .hip = nullptr};
+}
+
+void FeelRepeats::add(const std::pair<std::string, std::string_view>& name,
+                      std::string_view measure, double value) {
+  auto entry = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& one) {
+    return one.name == name && one.measure == measure;
+  });
+  if (entry == entries_.end()) entry = entries_.insert(entry, {name, measure, {}});
+  entry->values.push_back(value);
+}
+
+FeelFigures FeelRepeats::figures(const std::vector<Figure>& asked) const {
+  FeelFigures figures;
+  for (const Figure& figure : asked) {
+    for (const auto& [name, measure, values] : entries_) {
+      if (measure != figure.measure) continue;
+      figures.push_back({name.first, name.second,
+                         std::string(figure.as.empty() ? measure : figure.as), figure.of(values)});
+    }
+  }
+  return figures;
+}
+
+HipPath sliding_hand() {
+  constexpr double half = 0.1;  // [m] of the way
+  return HipPath({{0.0, {-half, 0.0, 0.060}},
+                  {0.5, {-half, 0.0, -press}},
+                  {1.0, {-half, 0.0, -press}},
+                  {3.0, {half, 0.0, -press}}});
+}
 
 std::string camera_options(double distance, double across, std::string_view sensor,
                            std::uint64_t seed) {
@@ -220,15 +209,11 @@ std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::st
 FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                        double distance) {
   constexpr double from = 1.2;
-  constexpr double half = 0.1;  // [m] of the way
-  const HipPath hand({{0.0, {-half, 0.0, 0.060}},
-                      {0.5, {-half, 0.0, -press}},
-                      {1.0, {-half, 0.0, -press}},
-                      {3.0, {half, 0.0, -press}}});
-  Repeats repeats;
+  const HipPath hand = sliding_hand();
+  FeelRepeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
-    const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    const Stage stage(
+    const std::uint64_t seed = options.seed_of(k);
+    const FeelStage stage(
         fmt::format("synthetic:plane?distance={}m&sensor=d4xx&seed={}", distance, seed));
     Loops loops(contestants, options.parameters, stage.scene);
     loops.add_usual(hand, seed, true);
@@ -240,21 +225,17 @@ FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOpti
       repeats.add(loops.names[i], "error", signal.largest_error());
     }
   }
-  FeelFigures figures;
-  repeats.median_of("felt", "felt", figures);
-  repeats.largest_of("step", "step", figures);
-  repeats.largest_of("error", "error", figures);
-  return figures;
+  return repeats.figures({{"felt", middle_of}, {"step", largest}, {"error", largest}});
 }
 
 FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOptions& options) {
   constexpr double speed = 0.05;   // [m/s]
   constexpr double watched = 0.4;  // [s]
-  Repeats repeats;
+  FeelRepeats repeats;
   for (int k = 0; k < options.phases; ++k) {
     const double start = settled + k / (options.phases * f_c);
-    const Stage stage(fmt::format("synthetic:plane?start={}&speed={}&{}", start, speed,
-                                  camera_options(middle, 0.3, "ideal", 1)));
+    const FeelStage stage(fmt::format("synthetic:plane?start={}&speed={}&{}", start, speed,
+                                      camera_options(middle, 0.3, "ideal", 1)));
     Loops loops(contestants, options.parameters, stage.scene);
     loops.add_usual(coming_down(0.0), options.seed * 100 + static_cast<std::uint64_t>(k), false);
     struct Seen {
@@ -278,11 +259,8 @@ FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOpti
                   std::max(seen[i].fall - seen[loops.ruler_of(i)].fall, 0.0));
     }
   }
-  FeelFigures figures;
-  repeats.largest_of("overshoot", "overshoot", figures);
-  repeats.median_of("swing", "swing-median", figures);
-  repeats.largest_of("swing", "swing", figures);
-  return figures;
+  return repeats.figures(
+      {{"overshoot", largest}, {"swing", middle_of, "swing-median"}, {"swing", largest}});
 }
 
 namespace {
@@ -311,12 +289,12 @@ FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOpt
   const double back = why == Unseen::dropped ? gone + 10.0 / f_c : gone + 2.0;
   // From when on a speed counts: the handle has come to rest by then, if there is time.
   const double from = why == Unseen::dropped ? back : back - 0.5;
-  Repeats repeats;
+  FeelRepeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
-    const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
+    const std::uint64_t seed = options.seed_of(k);
     const std::string camera = camera_options(middle, 0.3, "d4xx", seed);
-    const Stage stage = why == Unseen::covered ? Stage(covered_plane(gone, back), camera)
-                                               : Stage("synthetic:plane?" + camera);
+    const FeelStage stage = why == Unseen::covered ? FeelStage(covered_plane(gone, back), camera)
+                                                   : FeelStage("synthetic:plane?" + camera);
     Scenario scenario = stage.scenario(back + 2.0);
     if (why != Unseen::covered) {
       scenario.delay = [=](std::uint64_t frame) -> std::optional<double> {
@@ -337,9 +315,7 @@ FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOpt
       if (!loops.is_ruler(i)) repeats.add(loops.names[i], "kick", 1e3 * fastest[i]);
     }
   }
-  FeelFigures figures;
-  repeats.largest_of("kick", "kick", figures);
-  return figures;
+  return repeats.figures({{"kick", largest}});
 }
 
 FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
@@ -350,10 +326,10 @@ FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptio
   undamped.parameters.coupling.damping = 0.0;
   const HipPath hand = coming_down(0.0);
   const auto from = [](std::string_view) { return settled; };
-  Repeats repeats;
+  FeelRepeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
-    const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    const Stage stage("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed));
+    const std::uint64_t seed = options.seed_of(k);
+    const FeelStage stage("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed));
     Loops loops(contestants, damped.parameters, stage.scene);
     loops.add_usual(hand, seed, true);
     for (const auto& [i, signal] : signals(loops, stage.scenario(settled + 2.0), from))
@@ -363,21 +339,18 @@ FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptio
     for (const auto& [i, signal] : signals(without, stage.scenario(settled + 2.0), from))
       repeats.add(without.names[i], "undamped", 1e3 * felt_rms_of_all(signal.force));
   }
-  FeelFigures figures;
-  repeats.median_of("felt", "felt", figures);
-  repeats.median_of("undamped", "undamped", figures);
-  return figures;
+  return repeats.figures({{"felt", middle_of}, {"undamped", middle_of}});
 }
 
 FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                       double rate) {
   constexpr std::array latencies = {0.0, 0.1, 0.15, 0.3, 0.5};  // [s]
-  Repeats repeats;
+  FeelRepeats repeats;
   FeelFigures figures;
   for (const double latency : latencies) {
-    const std::uint64_t seed = 10 * options.seed + 1;
-    const Stage stage(fmt::format("synthetic:plane?fps={}Hz&{}", rate,
-                                  camera_options(close_up, 0.3, "d4xx", seed)));
+    const std::uint64_t seed = options.seed_of(0);
+    const FeelStage stage(fmt::format("synthetic:plane?fps={}Hz&{}", rate,
+                                      camera_options(close_up, 0.3, "d4xx", seed)));
     const double down = latency + 2.0 / rate + 0.1;
     const double from = down + settled;
     Scenario scenario = stage.scenario(from + 2.0);
@@ -396,8 +369,8 @@ FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptio
       repeats.add(loops.names[i], "mean-error", error);
     }
   }
-  repeats.largest_of("buzz", "buzz", figures);
-  repeats.largest_of("mean-error", "mean-error", figures);
+  const FeelFigures worst = repeats.figures({{"buzz", largest}, {"mean-error", largest}});
+  figures.insert(figures.end(), worst.begin(), worst.end());
   return figures;
 }
 

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "lab/experiment.hpp"
 #include "lab/method.hpp"
+#include "lab/play.hpp"
+#include "palpate/io/devices/hip_path.hpp"
 
 namespace palpate {
 class SyntheticCamera;
@@ -30,6 +35,11 @@ struct FeelOptions {
   std::uint64_t seed = 1;
   int repeats = 4;  ///< with other noise
   int phases = 8;   ///< of the frames, in which a motion begins
+
+  /// Of the noise of repeat `k`.
+  [[nodiscard]] std::uint64_t seed_of(int k) const {
+    return 10 * seed + 1 + static_cast<std::uint64_t>(k);
+  }
 };
 
 /// Options of a synthetic camera that looks at the origin at 34 degrees off straight down, with the
@@ -39,6 +49,44 @@ std::string camera_options(double distance, double across, std::string_view sens
                            std::uint64_t seed);
 /// A synthetic camera with such options before a scene.
 std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::string& options);
+
+/// What a camera shows, and the truth about it.
+struct FeelStage {
+  explicit FeelStage(const std::string& uri);  ///< of a synthetic camera
+  FeelStage(const std::shared_ptr<const Scene>& scene, const std::string& options);
+  /// @param duration  [s]  @return to be played while this lives
+  [[nodiscard]] Scenario scenario(double duration) const;
+
+  std::shared_ptr<SyntheticCamera> camera;
+  std::shared_ptr<const Scene> scene;
+};
+
+/// What repeats come to: measures of each method in each loop.
+class FeelRepeats {
+ public:
+  /// @param name  method and loop
+  void add(const std::pair<std::string, std::string_view>& name, std::string_view measure,
+           double value);
+
+  struct Figure {
+    std::string_view measure;                      ///< as it was added
+    double (*of)(std::span<const double> values);  ///< what stands for all repeats
+    std::string_view as = {};                      ///< its name among the figures, if it is another
+  };
+  /// @param asked  in the order of the figures
+  [[nodiscard]] FeelFigures figures(const std::vector<Figure>& asked) const;
+
+ private:
+  struct Entry {
+    std::pair<std::string, std::string_view> name;
+    std::string_view measure;
+    std::vector<double> values;
+  };
+  std::vector<Entry> entries_;
+};
+
+/// A hand that comes down and goes along x at 0.1 m/s from 1 s to 3 s, 8 mm deep in a plane.
+HipPath sliding_hand();
 
 /// Along a resting plane at 0.1 m/s before a D4xx. @param distance  [m] from the camera
 FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOptions& options,

@@ -142,11 +142,8 @@ std::string rest_on_grid(const std::string& name, const ExperimentOptions& optio
     grid.noise = noise;
     grid.seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
     const Vec3 hip(0.1 * r_c, 0.1 * r_c, -press);
-    watch(name, options,
-          {.duration = 1.2,
-           .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
-           .hip = [&](double) { return hip; }},
-          flat_truth(), 0.2, watched, Vec3(hip.x(), hip.y(), 4.0 * r_c));
+    watch(name, options, over_grid(grid, 1.2, [&](double) { return hip; }), flat_truth(), 0.2,
+          watched, Vec3(hip.x(), hip.y(), 4.0 * r_c));
   }
   return rows_of(name, scene, summary(watched));
 }
@@ -163,6 +160,12 @@ SyntheticCamera look_at(const Scene& scene, double distance, std::uint64_t seed)
   return {scene, setup, sensor};
 }
 
+Scenario seen_by(SyntheticCamera& camera, double duration, std::function<double(double t)> height) {
+  return {.duration = duration,
+          .cloud = [&](std::uint64_t frame, double t) { return camera.capture(t, frame).cloud; },
+          .hip = [height = std::move(height)](double t) { return Vec3(0.0, 0.0, height(t)); }};
+}
+
 // How far above the surface a hand is that comes down to it at 0.15 m/s: in contact after 0.4 s.
 constexpr double contact_time = 0.4;  // [s]
 double coming_down(double t) { return std::max(0.15 * (contact_time - t), -press); }
@@ -177,11 +180,8 @@ std::string rest_in_sight(const std::string& name, const ExperimentOptions& opti
   for (int k = 0; k < repeats; ++k) {
     SyntheticCamera camera =
         look_at(*scene, distance, options.seed * 1000 + static_cast<std::uint64_t>(k));
-    watch(name, options,
-          {.duration = contact_time + 2.0,
-           .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
-           .hip = [&](double t) { return Vec3(0.0, 0.0, coming_down(t)); }},
-          truth, contact_time + 1.0, watched);
+    watch(name, options, seen_by(camera, contact_time + 2.0, coming_down), truth,
+          contact_time + 1.0, watched);
   }
   return rows_of(name, scene_name, summary(watched));
 }
@@ -202,15 +202,11 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
     const double start = 1.5 + k / (repeats * f_c);
     const auto scene = std::make_shared<const Scene>(
         make_scene(Uri(fmt::format("synthetic:plane?start={}&speed={}", start, speed))));
-    const auto height = [&](double t) { return speed * std::max(t - start, 0.0); };
+    const auto hand = [=](double t) { return speed * std::max(t - start, 0.0) + coming_down(t); };
     SyntheticCamera camera =
         look_at(*scene, 0.95, options.seed * 1000 + static_cast<std::uint64_t>(k));
     const std::size_t before = watched.error.size();
-    watch(name, options,
-          {.duration = duration,
-           .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
-           .hip = [&](double t) { return Vec3(0.0, 0.0, height(t) + coming_down(t)); }},
-          truth_of(scene), start, watched);
+    watch(name, options, seen_by(camera, duration, hand), truth_of(scene), start, watched);
     for (std::size_t i = before; i < watched.error.size(); ++i) {
       lag[i - before] -= watched.error[i] / speed * f_c;
       ++counted[i - before];
@@ -243,14 +239,10 @@ std::string slide_on_plane(const std::string& name, const ExperimentOptions& opt
     return Vec3(x, 0.1 * x + 0.1 * r_c, -press);
   };
   Watched watched;
-  watch(name, options,
-        {.duration = 2.0,
-         .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
-         .hip = hip},
-        flat_truth(), 0.5, watched, hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
-  double largest = 0.0;
-  for (const double e : watched.error) largest = std::max(largest, std::abs(e));
-  return rows_of(name, scene, {{"largest", 1e3 * largest}});
+  watch(name, options, over_grid(grid, 2.0, hip), flat_truth(), 0.5, watched,
+        hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
+  for (double& error : watched.error) error = std::abs(error);
+  return rows_of(name, scene, {{"largest", 1e3 * largest(watched.error)}});
 }
 
 // Over sine waves 3 mm high and 10 mm long without noise, across them at 0.02 m/s.
@@ -262,11 +254,8 @@ std::string slide_on_relief(const std::string& name, const ExperimentOptions& op
   grid.height = [](double x, double) { return 1.5e-3 * std::sin(200.0 * std::numbers::pi * x); };
   const auto hip = [&](double t) { return Vec3(0.02 * (t - 1.5), 0.1 * r_c, -press); };
   Watched watched;
-  watch(name, options,
-        {.duration = 3.0,
-         .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
-         .hip = hip},
-        truth_of(scene), 0.5, watched, hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
+  watch(name, options, over_grid(grid, 3.0, hip), truth_of(scene), 0.5, watched,
+        hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   return rows_of(name, scene_name, summary(watched));
 }
 
@@ -312,20 +301,12 @@ std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentO
 }
 
 Scores fidelity_scores(const Table& table) {
-  AimTable scores({"scene", "measure"}, methods_in(table));
-  for (const Measure& measure : measures) {
-    if (table.numbers("value", {{"scene", measure.scene}}).empty()) continue;
-    std::vector<std::optional<double>> values;
-    for (const std::string& method : scores.methods()) {
-      const std::vector<double> rows = table.numbers(
-          "value", {{"method", method}, {"scene", measure.scene}, {"measure", measure.name}});
-      values.push_back(rows.empty() ? std::nullopt : std::optional(rows.front()));
-    }
-    scores.add({std::string(measure.scene), measure_text(measure.name, measure.unit)}, measure.aim,
-               values);
-  }
-  return scores.scores(
-      "* misses the aim; - popped through in every repeat. Measures: docs/pop.md.");
+  std::vector<AimLine> lines;
+  for (const Measure& measure : measures)
+    lines.push_back(
+        {{{"scene", measure.scene}, {"measure", measure.name}}, measure.unit, measure.aim});
+  return aim_scores(table, lines,
+                    "* misses the aim; - popped through in every repeat. Measures: docs/pop.md.");
 }
 
 }  // namespace

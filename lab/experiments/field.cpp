@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <memory>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include "lab/field/field_cases.hpp"
 #include "lab/field/field_judge.hpp"
 #include "lab/method.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/kernel/core/sensor.hpp"
 
 namespace palpate::lab {
@@ -91,18 +91,25 @@ std::vector<Cell> visits_cells(const Experiment& experiment, const ExperimentOpt
   return cells_of(field::visits_set(), experiment, options);
 }
 
-struct Sum {
-  int known = 0;
-  int unknown = 0;
-  int held = 0;
-  int right = 0;
-  int ghost = 0;
-  int numb = 0;
-  int wrong = 0;
-  double worst_ghost = 0.0;
-  std::vector<double> steps;   // [N] of the cases that were held
-  std::vector<double> shakes;  // [mm] of those in which hand and surface rest
-  std::string first_not_right;
+// What a method's rows of a class, or before a sensor, come to.
+struct Tally {
+  Table known;  // rows of the cases that count
+  Table held;
+  std::size_t unknown;
+
+  explicit Tally(const Table& rows)
+      : known(rows.where({{"unknown", "-"}})),
+        held(known.where({{"lost", "0"}})),
+        unknown(rows.rows() - known.rows()) {}
+  [[nodiscard]] std::size_t right() const { return known.where({{"right", "1"}}).rows(); }
+  // Cases in which a column is above 0.
+  [[nodiscard]] std::size_t count(std::string_view column) const {
+    return known.numbers(column, [&](std::size_t row) { return known.number(row, column) > 0.0; })
+        .size();
+  }
+  [[nodiscard]] double share(std::size_t some) const {
+    return static_cast<double>(some) / static_cast<double>(known.rows());
+  }
 };
 
 // Rounded down: 100.0 means all.
@@ -117,93 +124,56 @@ std::string median_text(const std::vector<double>& values) {
 // What a set shows of each method beside the shares of held and right cases.
 struct Extra {
   std::vector<std::string> columns;
-  std::vector<std::string> (*values)(const Sum&);
+  std::vector<std::string> (*values)(const Tally&);
   std::string_view note;
 };
 
-std::vector<std::string> step_values(const Sum& sum) { return {median_text(sum.steps)}; }
-
-std::vector<std::string> rest_values(const Sum& sum) {
-  const auto worst = std::max_element(sum.shakes.begin(), sum.shakes.end());
-  return {sum.known == 0 ? "-" : percent(static_cast<double>(sum.numb) / sum.known),
-          median_text(sum.shakes), worst == sum.shakes.end() ? "-" : fmt::format("{:.2g}", *worst)};
+std::vector<std::string> step_values(const Tally& of) {
+  return {median_text(of.held.numbers("worst_step_n"))};
 }
 
-// In the order of the table: what appears first comes first.
-using Sums = std::vector<std::pair<std::string, std::map<std::string, Sum>>>;
-
-Sum& sum_of(Sums& sums, const std::string& name, const std::string& method) {
-  auto found =
-      std::find_if(sums.begin(), sums.end(), [&](const auto& one) { return one.first == name; });
-  if (found != sums.end()) return found->second[method];
-  return sums.emplace_back(name, std::map<std::string, Sum>()).second[method];
+std::vector<std::string> rest_values(const Tally& of) {
+  const std::vector<double> shakes = of.held.numbers(
+      "shake_mm", [&](std::size_t row) { return of.held.text(row, "shake_mm") != "-"; });
+  return {of.known.rows() == 0 ? "-" : percent(of.share(of.count("numb"))), median_text(shakes),
+          shakes.empty() ? "-" : fmt::format("{:.2g}", largest(shakes))};
 }
 
-void add_row(const Table& table, std::size_t row, Sum& sum) {
-  if (table.text(row, "unknown") != "-") {
-    ++sum.unknown;
-    return;
-  }
-  const bool lost = table.number(row, "lost") != 0.0;
-  const bool right = table.number(row, "right") != 0.0;
-  ++sum.known;
-  sum.held += lost ? 0 : 1;
-  sum.right += right ? 1 : 0;
-  sum.ghost += table.number(row, "ghost_n") > 0.0 ? 1 : 0;
-  sum.numb += table.number(row, "numb") != 0.0 ? 1 : 0;
-  sum.wrong += table.number(row, "wrong_side") != 0.0 ? 1 : 0;
-  sum.worst_ghost = std::max(sum.worst_ghost, table.number(row, "ghost_n"));
-  if (!lost) sum.steps.push_back(table.number(row, "worst_step_n"));
-  if (!lost && table.text(row, "shake_mm") != "-")
-    sum.shakes.push_back(table.number(row, "shake_mm"));
-  if (!right && sum.first_not_right.empty()) sum.first_not_right = table.text(row, "text");
-}
-
-std::vector<std::string> line_of(const std::string& name, std::map<std::string, Sum>& sums,
+std::vector<std::string> line_of(const std::string& name, const Table& rows,
                                  const std::vector<std::string>& methods, const Extra& extra) {
-  const Sum& any = sums[methods.front()];
-  std::vector<std::string> line = {name, std::to_string(any.known), std::to_string(any.unknown)};
+  const Tally any(rows.where({{"method", methods.front()}}));
+  std::vector<std::string> line = {name, std::to_string(any.known.rows()),
+                                   std::to_string(any.unknown)};
   for (const std::string& method : methods) {
-    const Sum& sum = sums[method];
-    const double known = sum.known;
-    line.push_back(sum.known == 0 ? "-" : percent(sum.held / known));
-    line.push_back(sum.known == 0 ? "-" : percent(sum.right / known));
-    for (std::string& value : extra.values(sum)) line.push_back(std::move(value));
+    const Tally of(rows.where({{"method", method}}));
+    for (const std::size_t some : {of.held.rows(), of.right()})
+      line.push_back(of.known.rows() == 0 ? "-" : percent(of.share(some)));
+    for (std::string& value : extra.values(of)) line.push_back(std::move(value));
   }
   return line;
 }
 
 // How well a method knows itself that it is behind.
 std::string alarm_text(const Table& table, const std::string& method) {
-  const auto sum = [&](std::string_view column) {
-    double total = 0.0;
-    for (const double value : table.numbers(column, [&](std::size_t row) {
-           return table.text(row, "method") == method && table.text(row, "unknown") == "-";
-         }))
-      total += value;
-    return total;
-  };
-  const double behind = sum("time_behind_s");
+  const Table rows = table.where({{"method", method}, {"unknown", "-"}});
+  const auto total = [&](std::string_view column) { return sum(rows.numbers(column)); };
+  const double behind = total("time_behind_s");
   return fmt::format(
       "{}: behind for {:.1f} s of {:.0f} s, {:.1f} % of that flagged; false positives in {:.2f} "
       "% "
       "of the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
-      method, behind, sum("time_s"), behind > 0.0 ? 100.0 * sum("alarmed_s") / behind : 100.0,
-      100.0 * sum("false_alarm_s") / std::max(sum("time_s") - behind, 1e-3), sum("quick_returns"),
-      sum("times_behind"));
+      method, behind, total("time_s"), behind > 0.0 ? 100.0 * total("alarmed_s") / behind : 100.0,
+      100.0 * total("false_alarm_s") / std::max(total("time_s") - behind, 1e-3),
+      total("quick_returns"), total("times_behind"));
 }
 
 Scores scores_of(const Table& table, const Extra& extra) {
-  const std::vector<std::string> methods = methods_in(table);
-  Sums classes;
-  Sums sensors;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& method = table.text(row, "method");
-    add_row(table, row, sum_of(classes, table.text(row, "class"), method));
-    add_row(table, row, sum_of(sensors, table.text(row, "sensor"), method));
-  }
-  std::sort(sensors.begin(), sensors.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
+  const std::vector<std::string> methods = texts_in(table, "method");
+  const std::vector<Table> classes = table.by({"class"});
+  std::vector<Table> sensors = table.by({"sensor"});
+  std::sort(sensors.begin(), sensors.end(), [](const Table& a, const Table& b) {
+    return a.text(0, "sensor") < b.text(0, "sensor");
+  });
   Scores scores;
   scores.columns = {"class", "cases", "unknown"};
   for (const std::string& method : methods) {
@@ -211,34 +181,34 @@ Scores scores_of(const Table& table, const Extra& extra) {
     scores.columns.push_back("right [%]");
     scores.columns.insert(scores.columns.end(), extra.columns.begin(), extra.columns.end());
   }
-  for (auto& [name, sums] : classes) scores.rows.push_back(line_of(name, sums, methods, extra));
-  for (auto& [name, sums] : sensors)
-    scores.rows.push_back(line_of("all before " + name, sums, methods, extra));
+  for (const Table& rows : classes)
+    scores.rows.push_back(line_of(rows.text(0, "class"), rows, methods, extra));
+  for (const Table& rows : sensors)
+    scores.rows.push_back(line_of("all before " + rows.text(0, "sensor"), rows, methods, extra));
   scores.note = "The score is the mean over the classes of the shares, of the observable cases; " +
                 std::string(extra.note) + " docs/field.md has the rules.";
   std::vector<std::string> last = {"score", "", ""};
   for (const std::string& method : methods) {
-    double held = 0.0;
-    double right = 0.0;
-    int count = 0;
-    for (auto& [name, sums] : classes) {
-      const Sum& sum = sums[method];
-      if (sum.known == 0) continue;
-      held += static_cast<double>(sum.held) / sum.known;
-      right += static_cast<double>(sum.right) / sum.known;
-      ++count;
-      if (sum.right == sum.known) continue;
+    std::vector<double> held;
+    std::vector<double> right;
+    for (const Table& rows : classes) {
+      const Tally of(rows.where({{"method", method}}));
+      const std::size_t known = of.known.rows();
+      if (known == 0) continue;
+      held.push_back(of.share(of.held.rows()));
+      right.push_back(of.share(of.right()));
+      if (of.right() == known) continue;
+      const std::string first = of.known.where({{"right", "0"}}).text(0, "text");
       scores.note += fmt::format(
-          "\n{}, {}: {} cases: {} popped through, {} with a force in free space (up to {:.2f} "
-          "N), "
+          "\n{}, {}: {} cases: {} popped through, {} with a force in free space (up to {:.2f} N), "
           "{} with a missing force, {} with a force in the opposite direction; palpate eval {} "
           "--methods {} --case '{}'",
-          method, name, sum.known, sum.known - sum.held, sum.ghost, sum.worst_ghost, sum.numb,
-          sum.wrong, sum.first_not_right.substr(0, sum.first_not_right.find(':')), method,
-          sum.first_not_right);
+          method, rows.text(0, "class"), known, known - of.held.rows(), of.count("ghost_n"),
+          largest(of.known.numbers("ghost_n")), of.count("numb"), of.count("wrong_side"),
+          first.substr(0, first.find(':')), method, first);
     }
-    last.push_back(count == 0 ? "-" : percent(held / count));
-    last.push_back(count == 0 ? "-" : percent(right / count));
+    for (const std::vector<double>& shares : {held, right})
+      last.push_back(shares.empty() ? "-" : percent(mean(shares)));
     last.resize(last.size() + extra.columns.size());
   }
   scores.rows.push_back(std::move(last));

@@ -10,6 +10,7 @@
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
+#include "lab/statistics.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -91,26 +92,19 @@ std::string single_lift_rows(const std::string& name, const ExperimentOptions& o
 
 std::vector<Claim> single_lift_claims(const Table& table) {
   constexpr double r_c = 5e-3;
-  double least = 1e9;
-  double mean = 0.0;
-  int frames = 0;
-  double top = 0.0;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (table.text(row, "method") != "paper" || table.number(row, "touching") == 0.0) continue;
-    const double above = table.number(row, "proxy_y") - table.number(row, "cloud_y");
-    least = std::min(least, above);
-    mean += above;
-    top = table.number(row, "proxy_y");
-    ++frames;
-  }
-  if (frames == 0) return {};
-  mean /= frames;
+  const Table rows = table.where({{"method", "paper"}, {"touching", "1"}});
+  if (rows.rows() == 0) return {};
+  std::vector<double> above;
+  for (std::size_t row = 0; row < rows.rows(); ++row)
+    above.push_back(rows.number(row, "proxy_y") - rows.number(row, "cloud_y"));
+  const double least = *std::min_element(above.begin(), above.end());
+  const double top = rows.number(rows.rows() - 1, "proxy_y");
   return {{"5.2, Fig. 12", "the proxy at each update, a = 600 r_c/s^2 and s = 0.6 r_c",
            fmt::format("on the cloud throughout, by (23) h = {:.2f} r_c above r_c",
                        printed_h(single_noise * r_c) / r_c),
            fmt::format("at {} updates {:.2f} r_c above the surface, {:.2f} at least; at the end at "
                        "{:.1f} r_c",
-                       frames, mean / r_c, least / r_c, top / r_c),
+                       above.size(), mean(above) / r_c, least / r_c, top / r_c),
            least > 0.0 ? "reproduced: never below the cloud" : "differs: lost"}};
 }
 
@@ -156,34 +150,30 @@ std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share
 std::vector<Claim> lift_claims(const Table& table) {
   constexpr double r_c = 5e-3;
   constexpr double r_1 = 4.99e-3;
-  std::vector<Claim> claims;
+  const Table paper = table.where({{"method", "paper"}});
+  const Table fixed = table.where({{"method", "fixed-step"}});
+  const auto held = [](const Table& rows) {
+    return static_cast<double>(rows.where({{"popped", "0"}}).rows());
+  };
+  const auto share_held = [&](const Table& rows) {
+    return percent(held(rows) / static_cast<double>(rows.rows()));
+  };
+  if (paper.rows() == 0) return {};
   double held_quiet = 0.0;
   double lost_quiet = 1e9;
   int safe = 0;
   int safe_held = 0;
-  int held = 0;
-  int all = 0;
-  int fixed = 0;
-  int fixed_held = 0;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const bool popped = table.number(row, "popped") != 0.0;
-    const double a = table.number(row, "acceleration_rc");
-    const double s = table.number(row, "noise_rc");
-    if (table.text(row, "method") == "fixed-step") {
-      ++fixed;
-      fixed_held += popped ? 0 : 1;
-    }
-    if (table.text(row, "method") != "paper") continue;
-    ++all;
-    held += popped ? 0 : 1;
+  for (std::size_t row = 0; row < paper.rows(); ++row) {
+    const bool popped = paper.number(row, "popped") != 0.0;
+    const double a = paper.number(row, "acceleration_rc");
+    const double s = paper.number(row, "noise_rc");
     if (s == 0.0 && !popped) held_quiet = std::max(held_quiet, a);
     if (s == 0.0 && popped) lost_quiet = std::min(lost_quiet, a);
-    if (s <= 2.0 && predicted_safe(a * r_c, s * r_c, r_1)) {
-      ++safe;
-      safe_held += popped ? 0 : 1;
-    }
+    if (s > 2.0 || !predicted_safe(a * r_c, s * r_c, r_1)) continue;
+    ++safe;
+    safe_held += popped ? 0 : 1;
   }
-  if (all == 0) return claims;
+  std::vector<Claim> claims;
   const bool bound_ok = held_quiet <= 920.0 && lost_quiet >= 880.0;
   claims.push_back(
       {"4.5, (14)", "upper bound on point cloud acceleration a < r_1 f_c^2", "898 r_c/s^2",
@@ -191,7 +181,7 @@ std::vector<Claim> lift_claims(const Table& table) {
                    held_quiet, lost_quiet),
        bound_ok ? "reproduced (tolerance: 880 to 920, the spacing of the grid)" : "differs"});
   claims.push_back({"5.2, Fig. 13", "5,396 lifts for varying noise and acceleration",
-                    "the map of Fig. 13", percent(double(held) / all) + " of the map held",
+                    "the map of Fig. 13", share_held(paper) + " of the map held",
                     "reproduced in shape; the figure's axes cannot be read from the text"});
   if (safe > 0)
     claims.push_back({"6.2, (25)", "a pop through should not have occurred below the bound",
@@ -201,11 +191,13 @@ std::vector<Claim> lift_claims(const Table& table) {
                           ? "reproduced (tolerance 85 %: (25) is approximate)"
                           : "loose, as the paper says: it counts only pop-through at the tenth "
                             "frame, \"and not in frames leading up to\" it"});
-  if (fixed > 0)
+  if (fixed.rows() > 0)
     claims.push_back({"5.2", "a major improvement compared to [1]", "no number",
-                      percent(double(held) / all) + " held against " +
-                          percent(double(fixed_held) / fixed) + " by [1]",
-                      held * fixed > fixed_held * all ? "reproduced" : "differs"});
+                      share_held(paper) + " held against " + share_held(fixed) + " by [1]",
+                      held(paper) * static_cast<double>(fixed.rows()) >
+                              held(fixed) * static_cast<double>(paper.rows())
+                          ? "reproduced"
+                          : "differs"});
   return claims;
 }
 
@@ -239,18 +231,18 @@ std::vector<Cell> bound_cells(const Experiment& experiment, const ExperimentOpti
 }
 
 std::vector<Claim> bound_claims(const Table& table) {
-  const auto rows = [&table](std::size_t row) { return table.text(row, "method") == "paper"; };
-  std::vector<double> sigma = table.numbers("noise_rc", rows);
+  const Table rows = table.where({{"method", "paper"}});
+  std::vector<double> sigma = rows.numbers("noise_rc");
   if (sigma.size() < 6) return {};
   for (double& s : sigma) s *= 5e-3;
-  const std::vector<double> h = table.numbers("h_m", rows);
-  const std::vector<double> e = table.numbers("e_n", rows);
-  const std::vector<double> printed = table.numbers("printed_h_m", rows);
+  const std::vector<double> h = rows.numbers("h_m");
+  const std::vector<double> e = rows.numbers("e_n");
+  const std::vector<double> printed = rows.numbers("printed_h_m");
   double worst = 0.0;
   for (std::size_t i = 0; i < h.size(); ++i) worst = std::max(worst, std::abs(h[i] - printed[i]));
   double popped = 0.0;
   double from = 0.0;  // the least noise at which one was lost
-  const std::vector<double> lost = table.numbers("popped", rows);
+  const std::vector<double> lost = rows.numbers("popped");
   for (std::size_t i = lost.size(); i-- > 0;) {
     popped += lost[i];
     if (lost[i] > 0.0) from = sigma[i] / 5e-3;
@@ -263,7 +255,7 @@ std::vector<Claim> bound_claims(const Table& table) {
                     : fmt::format("differs by up to {:.2f} mm: how h is measured is not printed",
                                   1e3 * worst)},
       {"6.2, (24)", "e_n(s), a polynomial of degree 5",
-       fmt::format("e_n(2 r_c) = {:.3f}", table.numbers("printed_e_n", rows).back()),
+       fmt::format("e_n(2 r_c) = {:.3f}", rows.numbers("printed_e_n").back()),
        fmt::format("e_n(2 r_c) = {:.3f}", e.back()), "compared in the figure"},
       {"6.2", "pop through never occurred for a = 0 up to 2 r_c", "0",
        fmt::format("{:g} of {} lifts", popped, 20 * sigma.size()),

@@ -4,14 +4,13 @@
 
 #include <fmt/format.h>
 
+#include "lab/closed_loop.hpp"
 #include "lab/experiment.hpp"
 #include "lab/statistics.hpp"
 #include "lab/table.hpp"
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/material_map.hpp"
-#include "palpate/kernel/methods/methods.hpp"
-#include "palpate/servo/cycle.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -49,24 +48,18 @@ HipPath way() {
 
 std::string rows_of(const std::string& material, const Parameters& parameters) {
   const auto source = open_source("synthetic:plane?size=160x120&material=" + material);
-  ScriptedDevice device(way(), false);
-  ServoSettings settings;
-  settings.parameters = parameters;
-  settings.safety.initial_heat = 0.0;
-  constexpr std::size_t ring = 4;  // read after each tick
-  Cycle cycle(make_method("sight", {parameters, nullptr}), device, settings, ring);
-  auto ticks = cycle.reader();
+  const auto loop =
+      safe_loop(make_method("sight", {parameters, nullptr}), on_path(way()), parameters);
   std::optional<Frame> next = source->next();
   std::string rows;
   const auto count = static_cast<std::int64_t>(std::llround(duration / period));
   for (std::int64_t i = 0; i <= count; ++i) {
     const double t = static_cast<double>(i) * period;
     for (; next && next->stamp <= t; next = source->next())
-      cycle.put_frame(next->cloud, next->stamp, t);
-    cycle.run({.t = t});
-    ServoTick felt;
-    if (!ticks.try_pop(felt) || t < engaged) continue;
-    rows += csv_row(material, t, -1e3 * felt.tick.hip.z(), 1e3 * felt.tick.hip.x(), felt.force.z(),
+      loop->frame(next->cloud, next->stamp, t);
+    const Felt felt = loop->tick(t);
+    if (t < engaged) continue;
+    rows += csv_row(material, t, -1e3 * felt.hip.z(), 1e3 * felt.hip.x(), felt.force.z(),
                     -felt.force.x());
   }
   return rows;
@@ -87,22 +80,15 @@ std::vector<Cell> material_cells(const Experiment& /*experiment*/,
   return cells;
 }
 
-std::vector<std::string> materials_in(const Table& table) {
-  std::vector<std::string> names;
-  const auto name = [&](std::size_t row) { return table.text(row, "material"); };
-  for (const std::size_t row : first_rows(table, name)) names.push_back(name(row));
-  return names;
-}
-
 Scores material_scores(const Table& table) {
   Scores scores;
   scores.columns = {"material",     "stiffness [N/m]", "strike [N]",
                     "friction [-]", "stroke [mN]",     "rest [mN]"};
-  for (const std::string& name : materials_in(table)) {
+  for (const Table& rows : table.by({"material"})) {
     const auto during = [&](std::string_view column, double from, double to) {
-      return table.numbers(column, [&](std::size_t row) {
-        const double t = table.number(row, "t");
-        return table.text(row, "material") == name && t >= from - 1e-9 && t < to - 1e-9;
+      return rows.numbers(column, [&](std::size_t row) {
+        const double t = rows.number(row, "t");
+        return t >= from - 1e-9 && t < to - 1e-9;
       });
     };
     // Between 1 and 4 mm of the slow press.
@@ -111,7 +97,7 @@ Scores material_scores(const Table& table) {
                               mean(during("normal", press_at(1e-3), press_at(1e-3) + 0.01))) /
                              3e-3;
     const double hits = engaged + above / strike;
-    const std::vector<double> blow = during("normal", hits, hits + 0.06);
+    const double blow = largest(during("normal", hits, hits + 0.06));
     const double held = mean(during("normal", hits + 0.3, hits + 0.4));
     const double slides = stroke_from + 0.2;
     const double stops = stroke_from + stroke_for;
@@ -120,13 +106,12 @@ Scores material_scores(const Table& table) {
       return 1e3 * std::hypot(felt_rms_of_all(during("normal", from, to)),
                               felt_rms_of_all(during("tangential", from, to)));
     };
-    scores.rows.push_back(
-        {name, fmt::format("{:.0f}", stiffness),
-         fmt::format("{:.2f}", *std::max_element(blow.begin(), blow.end()) - held),
-         fmt::format("{:.2f}", mean(during("tangential", slides, stops)) /
-                                   mean(during("normal", slides, stops))),
-         fmt::format("{:.1f}", shaking(slides, stops)),
-         fmt::format("{:.1f}", shaking(rests, duration))});
+    scores.rows.push_back({rows.text(0, "material"), fmt::format("{:.0f}", stiffness),
+                           fmt::format("{:.2f}", blow - held),
+                           fmt::format("{:.2f}", mean(during("tangential", slides, stops)) /
+                                                     mean(during("normal", slides, stops))),
+                           fmt::format("{:.1f}", shaking(slides, stops)),
+                           fmt::format("{:.1f}", shaking(rests, duration))});
   }
   scores.note = fmt::format(
       "Strike: the force above the static force afterwards, at {} m/s. Friction: tangential over "

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 
 #include <fmt/format.h>
@@ -159,42 +158,29 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
                    const std::function<PopCase(int)>& draw, const ExperimentOptions& options) {
   const Parameters& parameters = options.parameters;
   const MethodMaker make = maker_of(method, options.own_methods);
-  int lost = 0;
-  int dipped = 0;
-  double step = 0.0;
-  double change = 0.0;
-  double caused = 0.0;
-  int noticeable = 0;
-  int ghosts = 0;
-  int numb = 0;
-  int wrong = 0;
-  int right = 0;
-  double worst_ghost = 0.0;
-  std::string first_not_right = "-";
-  std::string first = "-";
-  std::string simplest = "-";
+  int lost = 0, dipped = 0, noticeable = 0, ghosts = 0, numb = 0, wrong = 0, right = 0;
+  double step = 0.0, change = 0.0, caused = 0.0, worst_ghost = 0.0;
+  std::string first_not_right = "-", first = "-", simplest = "-";
   for (int i = from; i < from + count; ++i) {
     const PopCase c = draw(i);
     const Outcome outcome = play_case(make, c, parameters, true);
-    if (outcome.lost && lost == 0) {
-      first = c.text();
-      simplest = shrink(make, c, parameters).text();
-    }
-    lost += outcome.lost ? 1 : 0;
     ghosts += outcome.force.ghost() ? 1 : 0;
     numb += outcome.force.numb() ? 1 : 0;
     wrong += outcome.force.wrong_side() ? 1 : 0;
     worst_ghost = std::max(worst_ghost, outcome.force.worst_ghost());
-    const bool all_right = !outcome.lost && outcome.force.right();
-    right += all_right ? 1 : 0;
-    if (!all_right && !outcome.lost && first_not_right == "-") first_not_right = c.text();
-    dipped += !outcome.lost && outcome.dips > 0 ? 1 : 0;
-    if (!outcome.lost) {
-      step = std::max(step, outcome.step);
-      change = std::max(change, outcome.change);
-      caused = std::max(caused, outcome.caused);
-      noticeable += outcome.caused > noticed ? 1 : 0;
+    if (outcome.lost) {
+      if (lost++ > 0) continue;
+      first = c.text();
+      simplest = shrink(make, c, parameters).text();
+      continue;
     }
+    right += outcome.force.right() ? 1 : 0;
+    if (!outcome.force.right() && first_not_right == "-") first_not_right = c.text();
+    dipped += outcome.dips > 0 ? 1 : 0;
+    step = std::max(step, outcome.step);
+    change = std::max(change, outcome.change);
+    caused = std::max(caused, outcome.caused);
+    noticeable += outcome.caused > noticed ? 1 : 0;
   }
   return csv_row(method, family.name, from, count, lost, dipped, step, change, caused, noticeable,
                  first, simplest, ghosts, numb, wrong, right, worst_ghost, first_not_right);
@@ -251,79 +237,57 @@ std::string percent_held(double held, double cases) {
   return fmt::format("{:.2f}", std::floor(1e4 * held / cases) / 100.0);
 }
 
-// What a method's rows of a family come to, by column.
-struct Sum {
-  void add(const Table& table, std::size_t row) {
-    for (const std::string_view column :
-         {"cases", "lost", "dipped", "noticeable", "ghost", "numb", "wrong", "right"})
-      numbers[column] += table.number(row, column);
-    for (const std::string_view column : {"worst_change_n", "worst_caused_n", "worst_ghost_n"})
-      numbers[column] = std::max(numbers[column], table.number(row, column));
-    for (const std::string_view column : {"simplest", "first_not_right"}) {
-      if (first[column].empty() && table.text(row, column) != "-")
-        first[column] = table.text(row, column);
-    }
-  }
-  double operator[](std::string_view column) { return numbers[column]; }
-
-  std::map<std::string_view, double> numbers;
-  std::map<std::string_view, std::string> first;
-};
-
 Scores pop_scores(const Table& table) {
-  const std::vector<std::string> methods = methods_in(table);
-  std::vector<std::string> families;
-  std::map<std::pair<std::string, std::string>, Sum> sums;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& method = table.text(row, "method");
-    const std::string& family = table.text(row, "family");
-    if (std::find(families.begin(), families.end(), family) == families.end())
-      families.push_back(family);
-    sums[{method, family}].add(table, row);
-  }
+  const std::vector<std::string> methods = texts_in(table, "method");
+  const std::vector<Table> families = table.by({"family"});
   Scores scores;
   scores.columns = {"family", "cases"};
-  for (const std::string& method : methods) {
-    scores.columns.push_back(method + " held [%]");
-    scores.columns.push_back("dips [%]");
-    scores.columns.push_back("right [%]");
-  }
+  for (const std::string& method : methods)
+    for (const std::string& column :
+         {method + " held [%]", std::string("dips [%]"), std::string("right [%]")})
+      scores.columns.push_back(column);
   std::vector<double> held(methods.size(), 0.0);
   std::vector<double> right(methods.size(), 0.0);
   scores.note =
       "The score is the mean over the families of the share held, and of the share right: no "
       "pop-through, no force in free space, none in the opposite direction, none missing. "
       "docs/pop.md has the rules.";
-  for (const std::string& family : families) {
+  for (const Table& of_family : families) {
+    const std::string& family = of_family.text(0, "family");
     std::vector<std::string> line = {family};
     for (std::size_t m = 0; m < methods.size(); ++m) {
-      Sum& sum = sums[{methods[m], family}];
-      const double cases = sum["cases"];
+      const Table rows = of_family.where({{"method", methods[m]}});
+      const auto total = [&](std::string_view column) { return sum(rows.numbers(column)); };
+      const auto most = [&](std::string_view column) { return largest(rows.numbers(column)); };
+      const double cases = total("cases");
       if (m == 0) line.push_back(fmt::format("{:g}", cases));
-      line.push_back(percent_held(cases - sum["lost"], cases));
-      line.push_back(fmt::format("{:.1f}", 100.0 * sum["dipped"] / cases));
-      line.push_back(percent_held(sum["right"], cases));
-      held[m] += (cases - sum["lost"]) / cases;
-      right[m] += sum["right"] / cases;
-      if (sum["ghost"] + sum["numb"] + sum["wrong"] > 0.0)
+      line.push_back(percent_held(cases - total("lost"), cases));
+      line.push_back(fmt::format("{:.1f}", 100.0 * total("dipped") / cases));
+      line.push_back(percent_held(total("right"), cases));
+      held[m] += (cases - total("lost")) / cases;
+      right[m] += total("right") / cases;
+      if (total("ghost") + total("numb") + total("wrong") > 0.0)
         scores.note += fmt::format(
             "\n{}, {}: {:g} cases: {:g} with a force in free space (up to {:.2f} N), {:g} with a "
             "missing force, {:g} with a force in the opposite direction",
-            methods[m], family, cases, sum["ghost"], sum["worst_ghost_n"], sum["numb"],
-            sum["wrong"]);
+            methods[m], family, cases, total("ghost"), most("worst_ghost_n"), total("numb"),
+            total("wrong"));
       // None where all of them are lost, too: the next line plays one of those.
       for (const auto& [column, begin] :
            {std::pair("first_not_right", "; "), std::pair("simplest", "\n")}) {
-        if (!sum.first[column].empty())
-          scores.note += fmt::format("{}palpate eval pop --methods {} --case '{}'", begin,
-                                     methods[m], sum.first[column]);
+        const std::vector<std::string> texts = texts_in(rows, column);
+        const auto first = std::find_if(texts.begin(), texts.end(),
+                                        [](const std::string& text) { return text != "-"; });
+        if (first != texts.end())
+          scores.note +=
+              fmt::format("{}palpate eval pop --methods {} --case '{}'", begin, methods[m], *first);
       }
-      if (sum["worst_change_n"] > 0.0)
+      if (most("worst_change_n") > 0.0)
         scores.note += fmt::format(
             "\n{}, {}: in cases without pop-through the force changed by up to {:.3f} N; the "
             "change caused by the occluder was at most {:.3f} N, and above {:g} N in {:g} of {:g}",
-            methods[m], family, sum["worst_change_n"], sum["worst_caused_n"], noticed,
-            sum["noticeable"], cases);
+            methods[m], family, most("worst_change_n"), most("worst_caused_n"), noticed,
+            total("noticeable"), cases);
     }
     scores.rows.push_back(std::move(line));
   }

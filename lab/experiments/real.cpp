@@ -317,26 +317,17 @@ Scores real_scores(const Table& table) {
   scores.columns = {"action",     "method",   "places",           "lost",           "suspected",
                     "error [mm]", "felt [N]", "largest step [N]", "force range [N]"};
   for (const char* action : action_names) {
-    for (const std::string& method : methods_in(table)) {
-      const auto all = [&](std::size_t row) {
-        return table.text(row, "method") == method && table.text(row, "action") == action;
-      };
-      const auto held = [&](std::size_t row) {
-        return all(row) && table.number(row, "lost") == 0.0;
-      };
-      const auto sum = [&](std::string_view column) {
-        double total = 0.0;
-        for (const double value : table.numbers(column, all)) total += value;
-        return total;
-      };
+    for (const std::string& method : texts_in(table, "method")) {
+      const Table all = table.where({{"method", method}, {"action", action}});
+      const Table held = all.where({{"lost", "0"}});
       const auto of_held = [&](std::string_view column) {
-        const double value = median(table.numbers(column, held));
+        const double value = median(held.numbers(column));
         return std::isnan(value) ? std::string("-") : fmt::format("{:.3g}", value);
       };
-      scores.rows.push_back({action, method, fmt::format("{}", table.numbers("lost", all).size()),
-                             fmt::format("{:g}", sum("lost")),
-                             fmt::format("{:g}", sum("suspected")), of_held("error_mm"),
-                             of_held("felt_n"), of_held("step_n"), of_held("range_n")});
+      scores.rows.push_back(
+          {action, method, std::to_string(all.rows()), std::to_string(all.rows() - held.rows()),
+           fmt::format("{:g}", sum(all.numbers("suspected"))), of_held("error_mm"),
+           of_held("felt_n"), of_held("step_n"), of_held("range_n")});
     }
   }
   scores.note =

@@ -9,8 +9,6 @@
 #include <random>
 #include <string>
 
-#include <fmt/format.h>
-
 #include "lab/experiment.hpp"
 #include "lab/implicit_proxy.hpp"
 #include "lab/method.hpp"
@@ -217,23 +215,16 @@ std::vector<Cell> splat_cells(const Experiment& experiment, const ExperimentOpti
 }
 
 Scores splat_scores(const Table& table) {
-  Scores scores{.columns = {"body", "splat", "method", "held [%]", "force error [%]", "95 % [%]",
-                            "angle 95 % [deg]", "rest [mN]", "round [mN]"},
-                .rows = {},
-                .note =
-                    "Against `ideal` on the analytic body along the same path; force at rest "
-                    "and once round in 20 to 400 Hz. docs/sources.md."};
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    std::vector<std::string> line{table.text(row, "body"), table.text(row, "splat"),
-                                  table.text(row, "method")};
-    using Shown = std::pair<std::string_view, double>;
-    for (const auto& [column, unit] :
-         {Shown{"held", 100.0}, Shown{"error", 100.0}, Shown{"error_95", 100.0},
-          Shown{"angle_95", 1.0}, Shown{"rest_n", 1e3}, Shown{"round_n", 1e3}})
-      line.push_back(fmt::format("{:.1f}", unit * table.number(row, column)));
-    scores.rows.push_back(std::move(line));
-  }
-  return scores;
+  return scores_by(
+      table, {"body", "splat", "method"},
+      {shown("held [%]", {"held"}, "{:.1f}", 100.0),
+       shown("force error [%]", {"error"}, "{:.1f}", 100.0),
+       shown("95 % [%]", {"error_95"}, "{:.1f}", 100.0),
+       shown("angle 95 % [deg]", {"angle_95"}, "{:.1f}"),
+       shown("rest [mN]", {"rest_n"}, "{:.1f}", 1e3),
+       shown("round [mN]", {"round_n"}, "{:.1f}", 1e3)},
+      "Against `ideal` on the analytic body along the same path; force at rest and once round in "
+      "20 to 400 Hz. docs/sources.md.");
 }
 
 }  // namespace

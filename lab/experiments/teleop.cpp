@@ -181,43 +181,37 @@ std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOpt
   return cells;
 }
 
-// A row a way, scene and sensor: the worst over links with and without jitter and loss, by delay.
+// The worst over links with and without jitter and loss, by delay.
 Scores teleop_scores(const Table& table) {
-  Scores scores;
-  scores.columns = {
-      "way",       "scene",      "sensor",      "force [N], 0 to 500 ms", "worst, %", "shake [mm]",
-      "made [mJ]", "depth [mm]", "contact [N]", "tool's swing [mm]"};
-  const auto key = [&](std::size_t row) {
-    return table.text(row, "way") + ',' + table.text(row, "scene") + ',' +
-           table.text(row, "sensor");
+  // What only says something where the hand presses.
+  const auto pressed = [](const Column& column) {
+    return Column{column.title, [=](const Table& group) {
+                    return group.number(0, "force") > 0.0 ? column.text(group) : "-";
+                  }};
   };
-  for (const std::size_t row : first_rows(table, key)) {
-    const auto all = [&](std::string_view column) {
-      return table.numbers(column, [&](std::size_t other) { return key(other) == key(row); });
-    };
-    const auto most = [&](std::string_view column) {
-      const std::vector<double> values = all(column);
-      return *std::max_element(values.begin(), values.end());
-    };
-    const std::vector<double> forces = all("force");
+  const auto most = [](std::string title, std::string_view column, std::string_view format) {
+    return shown(std::move(title), {column}, format, 1.0, largest);
+  };
+  const auto range = [](const Table& group) {
+    const std::vector<double> forces = group.numbers("force");
     const auto [low, high] = std::minmax_element(forces.begin(), forces.end());
+    return fmt::format("{:.2f} to {:.2f}", *low, *high);
+  };
+  const auto worst = [](const Table& group) {
     double off = 0.0;
-    for (const double force : forces) off = std::max(off, std::abs(force / forces.front() - 1.0));
-    const bool presses_here = forces.front() > 0.0;
-    scores.rows.push_back(
-        {table.text(row, "way"), table.text(row, "scene"), table.text(row, "sensor"),
-         presses_here ? fmt::format("{:.2f} to {:.2f}", *low, *high) : "-",
-         presses_here ? fmt::format("{:.1f}", 100.0 * off) : "-",
-         fmt::format("{:.3f}", most("shake")),
-         presses_here ? fmt::format("{:.2f}", most("energy")) : "-",
-         fmt::format("{:.2f}", most("depth")), fmt::format("{:.1f}", most("contact")),
-         presses_here ? fmt::format("{:.2f}", most("swing")) : "-"});
-  }
-  scores.note =
+    for (const double force : group.numbers("force"))
+      off = std::max(off, std::abs(force / group.number(0, "force") - 1.0));
+    return fmt::format("{:.1f}", 100.0 * off);
+  };
+  return scores_by(
+      table, {"way", "scene", "sensor"},
+      {pressed({"force [N], 0 to 500 ms", range}), pressed({"worst, %", worst}),
+       most("shake [mm]", "shake", "{:.3f}"), pressed(most("made [mJ]", "energy", "{:.2f}")),
+       most("depth [mm]", "depth", "{:.2f}"), most("contact [N]", "contact", "{:.1f}"),
+       pressed(most("tool's swing [mm]", "swing", "{:.2f}"))},
       "The worst of round trips from 0 to 500 ms, with and without jitter of 30 ms and 5 % loss. "
       "Worst, %: of the force against that without delay. Aims: 5 %, 0.05 mm, 0.1 mJ; depth 0.5 mm "
-      "(rest), 1 mm (bob, come); 5 N. Measures: docs/teleop.md.";
-  return scores;
+      "(rest), 1 mm (bob, come); 5 N. Measures: docs/teleop.md.");
 }
 
 }  // namespace

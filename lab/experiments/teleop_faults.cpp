@@ -5,8 +5,6 @@
 #include <numbers>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
@@ -174,37 +172,30 @@ std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
 }
 
 Scores episode_scores(const Table& table) {
-  Scores scores;
-  scores.columns = {
-      "fault",         "scene",     "episodes",     "breach > 0.5 mm", "worst [mm]",
-      "contact > 5 N", "worst [N]", "unseen > 5 N", "rise [N/ms]",     "stops within [ms]"};
-  for (const std::string_view fault : faults) {
-    for (const std::string_view scene : {"rests", "moves"}) {
-      const auto of = [&](std::string_view column) {
-        return table.numbers(column, {{"fault", fault}, {"scene", scene}});
-      };
-      const auto most = [&](std::string_view column) {
-        const std::vector<double> values = of(column);
-        return *std::max_element(values.begin(), values.end());
-      };
-      const auto above = [&](std::string_view column, double limit) {
-        const std::vector<double> values = of(column);
-        return fmt::format("{}", std::count_if(values.begin(), values.end(),
-                                               [limit](double value) { return value > limit; }));
-      };
-      const std::size_t cases = of("breach").size();
-      if (cases == 0) continue;
-      scores.rows.push_back({std::string(fault), std::string(scene), fmt::format("{}", cases),
-                             above("breach", 0.5), fmt::format("{:.2f}", most("breach")),
-                             above("contact", 5.0), fmt::format("{:.1f}", most("contact")),
-                             above("unseen", 5.0), fmt::format("{:.3f}", most("rise")),
-                             fmt::format("{:.0f}", most("stop"))});
-    }
-  }
-  scores.note =
+  std::vector<Table> groups;
+  for (const std::string_view fault : faults)
+    for (const std::string_view scene : {"rests", "moves"})
+      groups.push_back(table.where({{"fault", fault}, {"scene", scene}}));
+  std::erase_if(groups, [](const Table& group) { return group.rows() == 0; });
+  const auto above = [](std::string title, std::string_view column, double limit) {
+    return Column{std::move(title), [=](const Table& group) {
+                    const std::vector<double> values = group.numbers(column);
+                    return std::to_string(std::count_if(
+                        values.begin(), values.end(), [=](double value) { return value > limit; }));
+                  }};
+  };
+  return scores_of(
+      groups, {"fault", "scene"},
+      {{"episodes", [](const Table& group) { return std::to_string(group.rows()); }},
+       above("breach > 0.5 mm", "breach", 0.5),
+       shown("worst [mm]", {"breach"}, "{:.2f}", 1.0, largest),
+       above("contact > 5 N", "contact", 5.0),
+       shown("worst [N]", {"contact"}, "{:.1f}", 1.0, largest),
+       above("unseen > 5 N", "unseen", 5.0),
+       shown("rise [N/ms]", {"rise"}, "{:.3f}", 1.0, largest),
+       shown("stops within [ms]", {"stop"}, "{:.0f}", 1.0, largest)},
       "Stops within: until the tool is slower than 10 mm/s. Unseen: a surface that moves while the "
-      "camera sends no frames. Measures: docs/teleop.md.";
-  return scores;
+      "camera sends no frames. Measures: docs/teleop.md.");
 }
 
 }  // namespace

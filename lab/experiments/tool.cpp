@@ -214,33 +214,15 @@ std::vector<Cell> tool_cells(const Experiment& /*experiment*/, const ExperimentO
 }
 
 Scores tool_scores(const Table& table) {
-  Scores scores{.columns = {"case", "camera", "method", "force error [%]", "torque error [%]",
-                            "force noise [mN]", "torque noise [mN m]", "longest behind [ms]"},
-                .rows = {},
-                .note =
-                    "Means over seeds; of the last column the largest. Errors in percent of "
-                    "stiffness times depth, and of that times half of the tool's length. "
-                    "docs/tools.md."};
-  const auto key = [&](std::size_t row) {
-    return table.text(row, "case") + "," + table.text(row, "camera") + "," +
-           table.text(row, "method");
-  };
-  for (const std::size_t row : first_rows(table, key)) {
-    const auto values = [&](std::string_view column) {
-      return table.numbers(column, [&](std::size_t other) { return key(other) == key(row); });
-    };
-    std::vector<std::string> line{table.text(row, "case"), table.text(row, "camera"),
-                                  table.text(row, "method")};
-    using Shown = std::pair<std::string_view, double>;
-    for (const auto& [column, unit] : {Shown{"force_error", 100.0}, Shown{"torque_error", 100.0},
-                                       Shown{"force_noise", 1e3}, Shown{"torque_noise", 1e3}}) {
-      line.push_back(fmt::format("{:.2f}", unit * mean(values(column))));
-    }
-    const std::vector<double> behind = values("behind");
-    line.push_back(fmt::format("{:.0f}", 1e3 * *std::max_element(behind.begin(), behind.end())));
-    scores.rows.push_back(std::move(line));
-  }
-  return scores;
+  return scores_by(
+      table, {"case", "camera", "method"},
+      {shown("force error [%]", {"force_error"}, "{:.2f}", 100.0, mean),
+       shown("torque error [%]", {"torque_error"}, "{:.2f}", 100.0, mean),
+       shown("force noise [mN]", {"force_noise"}, "{:.2f}", 1e3, mean),
+       shown("torque noise [mN m]", {"torque_noise"}, "{:.2f}", 1e3, mean),
+       shown("longest behind [ms]", {"behind"}, "{:.0f}", 1e3, largest)},
+      "Means over seeds; of the last column the largest. Errors in percent of stiffness times "
+      "depth, and of that times half of the tool's length. docs/tools.md.");
 }
 
 }  // namespace

@@ -315,40 +315,23 @@ std::vector<Cell> tool_case_cells(const Experiment& /*experiment*/,
 }
 
 Scores tool_case_scores(const Table& table) {
-  Scores scores{.columns = {"family", "method", "cases", "behind", "at most [%]", "lost",
-                            "longest [ms]", "lifts", "pulled", "at most [%]", "jumps", "step [N]"},
-                .rows = {},
-                .note =
-                    "'At most': the upper bound of the share, with 95 % confidence (Wilson). "
-                    "docs/tools.md."};
-  const auto key = [&](std::size_t row) {
-    return table.text(row, "family") + "," + table.text(row, "method");
+  const auto total = [](std::string title, std::string_view column) {
+    return shown(std::move(title), {column}, "{:.0f}", 1.0, sum);
   };
-  for (const std::size_t row : first_rows(table, key)) {
-    const auto all = [&](std::string_view column) {
-      return table.numbers(column, [&](std::size_t other) { return key(other) == key(row); });
-    };
-    const auto sum = [&](std::string_view column) {
-      double sum = 0.0;
-      for (const double value : all(column)) sum += value;
-      return static_cast<std::size_t>(sum);
-    };
-    const auto most = [&](std::string_view column) {
-      const std::vector<double> values = all(column);
-      return *std::max_element(values.begin(), values.end());
-    };
-    const auto bound = [](std::size_t found, std::size_t of) {
-      return of == 0 ? "-" : fmt::format("{:.3g}", 100.0 * wilson(found, of).high);
-    };
-    scores.rows.push_back({table.text(row, "family"), table.text(row, "method"),
-                           std::to_string(sum("cases")), std::to_string(sum("behind")),
-                           bound(sum("behind"), sum("cases")), std::to_string(sum("lost")),
-                           fmt::format("{:.0f}", 1e3 * most("longest")),
-                           std::to_string(sum("lifts")), std::to_string(sum("pulled")),
-                           bound(sum("pulled"), sum("lifts")), std::to_string(sum("jumps")),
-                           fmt::format("{:.2f}", most("step"))});
-  }
-  return scores;
+  const auto bound = [](std::string_view found, std::string_view of) {
+    return Column{"at most [%]", [=](const Table& group) {
+                    const auto all = static_cast<std::size_t>(sum(group.numbers(of)));
+                    const auto some = static_cast<std::size_t>(sum(group.numbers(found)));
+                    return all == 0 ? "-" : fmt::format("{:.3g}", 100.0 * wilson(some, all).high);
+                  }};
+  };
+  return scores_by(
+      table, {"family", "method"},
+      {total("cases", "cases"), total("behind", "behind"), bound("behind", "cases"),
+       total("lost", "lost"), shown("longest [ms]", {"longest"}, "{:.0f}", 1e3, largest),
+       total("lifts", "lifts"), total("pulled", "pulled"), bound("pulled", "lifts"),
+       total("jumps", "jumps"), shown("step [N]", {"step"}, "{:.2f}", 1.0, largest)},
+      "'At most': the upper bound of the share, with 95 % confidence (Wilson). docs/tools.md.");
 }
 
 }  // namespace

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-
 #include "lab/experiment.hpp"
 #include "palpate/io/devices/simulated_hand.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
@@ -112,20 +110,14 @@ std::vector<Cell> turning_cells(const Experiment& /*experiment*/,
 }
 
 Scores turning_scores(const Table& table) {
-  Scores scores{.columns = {"tool", "grip", "without", "bounded", "stiffest [N m/rad]"},
-                .rows = {},
-                .note =
-                    "Rate of turning [rad/s, rms] and force [N, mean] in the third of three "
-                    "seconds, without a bound of the stiffness in rotation and with a "
-                    "session's; and the stiffest with which it rests. docs/tools.md."};
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto number = [&](std::string_view column) { return table.number(row, column); };
-    scores.rows.push_back({table.text(row, "tool"), table.text(row, "grip"),
-                           fmt::format("{:.2f}, {:.2f}", number("free_rate"), number("free_force")),
-                           fmt::format("{:.2f}, {:.2f}", number("rate"), number("force")),
-                           fmt::format("{:.2g}", number("stiffest"))});
-  }
-  return scores;
+  return scores_by(
+      table, {"tool", "grip"},
+      {shown("without", {"free_rate", "free_force"}, "{:.2f}"),
+       shown("bounded", {"rate", "force"}, "{:.2f}"),
+       shown("stiffest [N m/rad]", {"stiffest"}, "{:.2g}")},
+      "Rate of turning [rad/s, rms] and force [N, mean] in the third of three seconds, without a "
+      "bound of the stiffness in rotation and with a session's; and the stiffest with which it "
+      "rests. docs/tools.md.");
 }
 
 }  // namespace

@@ -254,45 +254,27 @@ std::string stiffness_text(double stiffness) {
                                : fmt::format("{:.0f}", stiffness);
 }
 
-// A row a device, hand and damping: theory, and the range over all scenes of each method and way.
+// Theory, and the range over all scenes of each method and way.
 Scores zwidth_scores(const Table& table) {
-  const std::vector<std::string> methods = methods_in(table);
-  Scores scores;
-  scores.columns = {"device", "hand", "k_d", "2(b+k_d)/(T+2t_d)", "linear"};
-  for (const std::string& method : methods) {
-    scores.columns.push_back(method);
-    scores.columns.push_back(method + ", chain");
-  }
-  for (const std::size_t row : first_rows(table, [&](std::size_t any) {
-         return table.text(any, "device") + ',' + table.text(any, "hand") + ',' +
-                table.text(any, "damping");
-       })) {
-    std::vector<std::string> line = {table.text(row, "device"), table.text(row, "hand"),
-                                     table.text(row, "damping")};
-    line.push_back(fmt::format("{:.0f}", table.number(row, "bound")));
-    line.push_back(stiffness_text(table.number(row, "linear")));
-    for (const std::string& method : methods) {
-      for (const std::string_view way : {"straight", "chain"}) {
-        const std::vector<double> values = table.numbers("stiffness", {{"device", line[0]},
-                                                                       {"hand", line[1]},
-                                                                       {"damping", line[2]},
-                                                                       {"method", method},
-                                                                       {"way", way}});
-        if (values.empty()) {
-          line.emplace_back("-");
-          continue;
-        }
-        const auto [least, most] = std::minmax_element(values.begin(), values.end());
-        line.push_back(stiffness_text(*least) +
-                       (*most > *least ? " to " + stiffness_text(*most) : std::string()));
-      }
+  std::vector<Column> columns = {
+      {"k_d", [](const Table& group) { return group.text(0, "damping"); }},
+      shown("2(b+k_d)/(T+2t_d)", {"bound"}, "{:.0f}"),
+      {"linear", [](const Table& group) { return stiffness_text(group.number(0, "linear")); }}};
+  for (const std::string& method : texts_in(table, "method")) {
+    for (const std::string_view way : {"straight", "chain"}) {
+      columns.push_back(
+          {way == "chain" ? method + ", chain" : method, [=](const Table& group) {
+             const std::vector<double> values =
+                 group.numbers("stiffness", {{"method", method}, {"way", way}});
+             if (values.empty()) return std::string("-");
+             const auto [least, most] = std::minmax_element(values.begin(), values.end());
+             return stiffness_text(*least) + (*most > *least ? " to " + stiffness_text(*most) : "");
+           }});
     }
-    scores.rows.push_back(std::move(line));
   }
-  scores.note =
-      "Largest stable stiffness [N/m], from the worst to the best of scenes and cameras; k_d in N "
-      "s/m. Measures: docs/feel.md.";
-  return scores;
+  return scores_of(table.by({"device", "hand", "damping"}), {"device", "hand"}, columns,
+                   "Largest stable stiffness [N/m], from the worst to the best of scenes and "
+                   "cameras; k_d in N s/m. Measures: docs/feel.md.");
 }
 
 }  // namespace

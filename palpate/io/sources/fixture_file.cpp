@@ -59,9 +59,7 @@ void read_mesh(const TomlTable& table, const toml::node& node, const fs::path& f
   std::string name;
   table.read("file", name);
   const fs::path path = folder / name;
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  const std::string extension = lower_case(path.extension().string());
   if (extension != ".ply" && extension != ".stl")
     table.fail(node, "'file' is '" + name + "'", "give a closed mesh as .ply or .stl");
   PointFile mesh = extension == ".ply" ? read_ply(path) : read_stl(path);

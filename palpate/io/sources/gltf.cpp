@@ -203,9 +203,7 @@ class GltfReader {
       const Eigen::Quaterniond turn =
           Eigen::Quaterniond(rotation) *
           Eigen::Quaterniond(turns(i, 3), turns(i, 0), turns(i, 1), turns(i, 2));
-      splat.log_scales.emplace_back(logs + Vec3::Constant(std::log(scale)));
-      splat.heads.emplace_back(turn.w(), std::log(opacities(i, 0) / (1.0 - opacities(i, 0))), 0.0);
-      splat.rotations.emplace_back(turn.vec());
+      splat.add(logs + Vec3::Constant(std::log(scale)), opacities(i, 0), turn);
       for (std::size_t k = 0; k < 3; ++k)
         out_.colours.push_back(
             detail::colour_byte(detail::colour_share(has_harmonic ? colours(i, k) : 0.0)));
@@ -223,19 +221,10 @@ class GltfReader {
     values.width = type == "SCALAR" ? 1 : static_cast<std::size_t>(type.back() - '0');
     values.count = it.at("count").get<std::size_t>();
     const auto kind = it.at("componentType").get<unsigned>();
-    constexpr std::array<std::pair<unsigned, std::string_view>, 6> kinds{{{5120, "int8"},
-                                                                          {5121, "uint8"},
-                                                                          {5122, "int16"},
-                                                                          {5123, "uint16"},
-                                                                          {5125, "uint32"},
-                                                                          {5126, "float32"}}};
-    const auto* const known = std::find_if(kinds.begin(), kinds.end(),
-                                           [&](const auto& each) { return each.first == kind; });
-    if (known == kinds.end()) fail(of + " is of no known component type", "mend it");
-    const auto scalar =
-        std::find_if(detail::scalars.begin(), detail::scalars.end(),
-                     [&](const detail::Scalar& each) { return each.name == known->second; });
-    const bool is_signed = kind == 5120 || kind == 5122;
+    const detail::Scalar* scalar = detail::find_scalar(
+        [&](const detail::Scalar& each) { return kind != 0 && each.gltf == kind; });
+    if (scalar == nullptr) fail(of + " is of no known component type", "mend it");
+    const bool is_signed = scalar->name.front() == 'i';
     const double unit =
         it.value("normalized", false) && !scalar->is_float
             ? std::ldexp(1.0, static_cast<int>(8 * scalar->size) - (is_signed ? 1 : 0)) - 1.0

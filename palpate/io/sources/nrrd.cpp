@@ -42,10 +42,8 @@ const detail::Scalar* type_named(std::string name) {
   if (name.ends_with("_t")) name.resize(name.size() - 2);
   if (name.ends_with("int") && name.size() > 4) name.resize(name.size() - 3);
   if (name.ends_with("longlong")) name.replace(name.size() - 8, 8, "int64");
-  const auto* const found = std::find_if(
-      detail::scalars.begin(), detail::scalars.end(),
+  return detail::find_scalar(
       [&](const auto& each) { return !name.empty() && (each.name == name || each.ply == name); });
-  return found == detail::scalars.end() ? nullptr : found;
 }
 
 void take_field(const detail::Cursor& file, const std::string& key, std::string value,

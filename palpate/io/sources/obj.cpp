@@ -2,7 +2,6 @@
 #include <charconv>
 #include <vector>
 
-#include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 
@@ -50,10 +49,6 @@ PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name) {
   }
   mesh.width = mesh.points.size();
   return mesh;
-}
-
-PointFile read_obj(const std::filesystem::path& path) {
-  return parse_obj(read_file(path, detail::largest_file), path.string());
 }
 
 }  // namespace palpate

@@ -7,7 +7,6 @@
 
 #include <lzf.h>
 
-#include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -80,9 +79,9 @@ std::optional<std::uint64_t> count_of(const Cursor& file, const PcdHeader& heade
 
 const Scalar* type_of(const Cursor& file, std::string_view type, std::string_view size) {
   const std::string wanted = std::string(type) + std::string(size);
-  const auto* const found = std::find_if(detail::scalars.begin(), detail::scalars.end(),
-                                         [&](const Scalar& known) { return known.pcd == wanted; });
-  if (found == detail::scalars.end())
+  const Scalar* found =
+      detail::find_scalar([&](const Scalar& known) { return known.pcd == wanted; });
+  if (found == nullptr)
     file.fail(
         "no field can have TYPE " + detail::quoted(type) + " and SIZE " + detail::quoted(size),
         "types are I and U of 1, 2, 4, 8 bytes, and F of 4, 8");
@@ -263,10 +262,6 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
   cloud.non_finite = detail::count_non_finite(cloud.points);
   cloud.bytes_unread = file.left_after_blanks();
   return cloud;
-}
-
-PointFile read_pcd(const std::filesystem::path& path) {
-  return parse_pcd(read_file(path, detail::largest_file), path.string());
 }
 
 }  // namespace palpate

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
 #include <fstream>
 #include <stdexcept>
 
-#include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -40,11 +38,10 @@ struct PlyHeader {
 };
 
 const Scalar* type_of(const Cursor& file, std::string_view name) {
-  const auto* const found =
-      std::find_if(detail::scalars.begin(), detail::scalars.end(), [&](const Scalar& known) {
-        return !known.ply.empty() && (known.ply == name || known.name == name);
-      });
-  if (found == detail::scalars.end())
+  const Scalar* found = detail::find_scalar([&](const Scalar& known) {
+    return !known.ply.empty() && (known.ply == name || known.name == name);
+  });
+  if (found == nullptr)
     file.fail_in_line(detail::quoted(name) + " is not a type of PLY",
                       "types are char, uchar, short, ushort, int, uint, float and double");
   return found;
@@ -259,16 +256,8 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   return parse(bytes, name, false);
 }
 
-PointFile read_ply(const std::filesystem::path& path) {
-  return parse_ply(read_file(path, detail::largest_file), path.string());
-}
-
 PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name) {
   return parse(bytes, name, true);
-}
-
-PointFile read_splat(const std::filesystem::path& path) {
-  return parse_splat(read_file(path, detail::largest_file), path.string());
 }
 
 bool holds_splat(const std::filesystem::path& path) {

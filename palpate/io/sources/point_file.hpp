@@ -27,6 +27,8 @@ struct SplatColumns {
   std::vector<Vec3> log_scales;  ///< natural logarithms of the deviations along its axes
   std::vector<Vec3> heads;       ///< w of its rotation, logit of its opacity, and 0
   std::vector<Vec3> rotations;   ///< x, y, z of its rotation, a quaternion of any length
+
+  void add(const Vec3& logs, double opacity, const Eigen::Quaterniond& turn);
 };
 
 /// The content of a PCD or PLY file, in its own coordinates and unit (usually metres).
@@ -60,14 +62,20 @@ struct PointFile {
   std::size_t bytes_unread = 0;
 };
 
+/// Reads a file by a parser of bytes in memory, of which `name` is what an error calls them.
+/// @param largest  [bytes] larger files are refused
+/// @throws Error as the parser, or if it cannot be read.
+PointFile read_by(PointFile (*parse)(std::span<const std::byte> bytes, std::string_view name),
+                  const std::filesystem::path& path,
+                  std::uintmax_t largest = std::uintmax_t{1} << 32U);
+
 /// Reads a PCD file, versions 0.5 to 0.7: ascii, binary (little endian) or binary_compressed;
 /// fields of any order, type, size and count, as long as x, y and z are among them.
 ///
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file, the line or offset, and what was wrong.
-PointFile read_pcd(const std::filesystem::path& path);
-/// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
+inline PointFile read_pcd(const std::filesystem::path& path) { return read_by(parse_pcd, path); }
 
 /// Reads a PLY file, version 1.0: ascii, little or big endian. Of element `vertex` x, y, z and
 /// nx, ny, nz and red, green, blue; of `face` and `tristrips` vertex_indices or vertex_index; of
@@ -75,16 +83,16 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
 ///
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file, the line or offset, and what was wrong.
-PointFile read_ply(const std::filesystem::path& path);
-/// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
+inline PointFile read_ply(const std::filesystem::path& path) { return read_by(parse_ply, path); }
 
 /// Reads a PLY whose points are Gaussians as 3D Gaussian splatting writes them: `opacity`,
 /// `scale_0` to `scale_2`, `rot_0` to `rot_3`, w first, and perhaps `f_dc_0` to `f_dc_2`. Otherwise
 /// as read_ply.
-PointFile read_splat(const std::filesystem::path& path);
-/// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name);
+inline PointFile read_splat(const std::filesystem::path& path) {
+  return read_by(parse_splat, path);
+}
 /// Does a PLY or glTF file declare Gaussians in its first 64 kB? False too of what cannot be read.
 bool holds_splat(const std::filesystem::path& path);
 
@@ -93,23 +101,24 @@ bool holds_splat(const std::filesystem::path& path);
 ///
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file and what was wrong
-PointFile read_stl(const std::filesystem::path& path);
-/// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name);
+inline PointFile read_stl(const std::filesystem::path& path) {
+  return read_by(parse_stl, path, std::uintmax_t{1} << 28U);
+}
 
 /// Reads a Wavefront OBJ's `v` and `f` into `points` and `triangles`; polygons are fanned. All else
 /// is passed over. @throws Error naming the file, the line, and what was wrong
-PointFile read_obj(const std::filesystem::path& path);
-/// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name);
+inline PointFile read_obj(const std::filesystem::path& path) { return read_by(parse_obj, path); }
 
 /// Reads an SPZ of versions 1 to 4 as read_splat does a PLY.
 ///
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file and what was wrong
-PointFile read_spz(const std::filesystem::path& path);
-/// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name);
+inline PointFile read_spz(const std::filesystem::path& path) {
+  return read_by(parse_spz, path, std::uintmax_t{1} << 31U);
+}
 
 /// Is a file, by its name, a glTF or GLB?
 bool is_gltf(const std::filesystem::path& path);
@@ -117,7 +126,7 @@ bool is_gltf(const std::filesystem::path& path);
 /// KHR_gaussian_splatting, each moved by its nodes. Buffers are inside, or files beside or below.
 /// @throws Error naming the file and what was wrong
 PointFile read_gltf(const std::filesystem::path& path, bool as_splat);
-/// The same for bytes in memory; `name` is what an error calls them. @param folder  of the buffers
+/// The same for bytes in memory. @param folder  of the buffers
 PointFile parse_gltf(std::span<const std::byte> bytes, std::string_view name,
                      const std::filesystem::path& folder, bool as_splat);
 
@@ -131,7 +140,7 @@ bool is_nrrd(const std::filesystem::path& path);
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file and what was wrong, also if there is no such place.
 PointFile read_nrrd(const std::filesystem::path& path, double level = 0.0);
-/// The same for bytes in memory; `name` is what an error calls them. @param folder  of the data
+/// The same for bytes in memory. @param folder  of the data
 PointFile parse_nrrd(std::span<const std::byte> bytes, std::string_view name,
                      const std::filesystem::path& folder, double level = 0.0);
 

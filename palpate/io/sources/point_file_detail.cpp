@@ -8,9 +8,23 @@
 #include <system_error>
 
 #include "palpate/io/sources/files.hpp"
+#include "palpate/io/sources/point_file.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-namespace palpate::detail {
+namespace palpate {
+
+PointFile read_by(PointFile (*parse)(std::span<const std::byte> bytes, std::string_view name),
+                  const std::filesystem::path& path, std::uintmax_t largest) {
+  return parse(read_file(path, largest), path.string());
+}
+
+void SplatColumns::add(const Vec3& logs, double opacity, const Eigen::Quaterniond& turn) {
+  log_scales.push_back(logs);
+  heads.emplace_back(turn.w(), std::log(opacity / (1.0 - opacity)), 0.0);
+  rotations.emplace_back(turn.vec());
+}
+
+namespace detail {
 namespace {
 
 constexpr std::string_view blanks = " \t\r\n\v\f";
@@ -272,4 +286,5 @@ void read_rows(Cursor& file, std::span<const Column> columns, std::size_t rows, 
   }
 }
 
-}  // namespace palpate::detail
+}  // namespace detail
+}  // namespace palpate

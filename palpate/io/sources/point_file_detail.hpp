@@ -33,18 +33,21 @@ T load(const std::byte* from, std::endian order) noexcept {
 }
 
 /// A type of values in point files: its names here, in the header of a PCD (TYPE and SIZE) and in
-/// that of a PLY, which also takes the first.
+/// that of a PLY, which also takes the first, and its number in glTF, 0: it has none.
 struct Scalar {
   std::string_view name, pcd, ply;
+  unsigned gltf;
   bool is_float;
   std::size_t size;  ///< [bytes]
   double (*value)(const std::byte* from, std::endian order) noexcept;
 
   template <class T>
-  static constexpr Scalar of(std::string_view name, std::string_view pcd, std::string_view ply) {
+  static constexpr Scalar of(std::string_view name, std::string_view pcd, std::string_view ply,
+                             unsigned gltf) {
     return {name,
             pcd,
             ply,
+            gltf,
             std::is_floating_point_v<T>,
             sizeof(T),
             [](const std::byte* from, std::endian order) noexcept {
@@ -52,16 +55,23 @@ struct Scalar {
             }};
   }
 };
-inline constexpr std::array scalars{Scalar::of<std::int8_t>("int8", "I1", "char"),
-                                    Scalar::of<std::uint8_t>("uint8", "U1", "uchar"),
-                                    Scalar::of<std::int16_t>("int16", "I2", "short"),
-                                    Scalar::of<std::uint16_t>("uint16", "U2", "ushort"),
-                                    Scalar::of<std::int32_t>("int32", "I4", "int"),
-                                    Scalar::of<std::uint32_t>("uint32", "U4", "uint"),
-                                    Scalar::of<std::int64_t>("int64", "I8", ""),
-                                    Scalar::of<std::uint64_t>("uint64", "U8", ""),
-                                    Scalar::of<float>("float32", "F4", "float"),
-                                    Scalar::of<double>("float64", "F8", "double")};
+inline constexpr std::array scalars{Scalar::of<std::int8_t>("int8", "I1", "char", 5120),
+                                    Scalar::of<std::uint8_t>("uint8", "U1", "uchar", 5121),
+                                    Scalar::of<std::int16_t>("int16", "I2", "short", 5122),
+                                    Scalar::of<std::uint16_t>("uint16", "U2", "ushort", 5123),
+                                    Scalar::of<std::int32_t>("int32", "I4", "int", 0),
+                                    Scalar::of<std::uint32_t>("uint32", "U4", "uint", 5125),
+                                    Scalar::of<std::int64_t>("int64", "I8", "", 0),
+                                    Scalar::of<std::uint64_t>("uint64", "U8", "", 0),
+                                    Scalar::of<float>("float32", "F4", "float", 5126),
+                                    Scalar::of<double>("float64", "F8", "double", 0)};
+
+/// The first type of that kind; null if there is none.
+template <class Is>
+const Scalar* find_scalar(const Is& is) {
+  const auto* const found = std::find_if(scalars.begin(), scalars.end(), is);
+  return found == scalars.end() ? nullptr : found;
+}
 
 /// The next token of `rest`, which shrinks by it; empty if there is none. Blanks separate.
 [[nodiscard]] std::string_view next_token(std::string_view& rest) noexcept;

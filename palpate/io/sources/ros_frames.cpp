@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -11,6 +10,7 @@
 
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"
+#include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 
@@ -23,12 +23,8 @@ constexpr std::string_view units_key = "units_per_metre=";
 constexpr std::uint8_t uint32 = 6, float32 = 7, float64 = 8;  // PointField::datatype
 constexpr double least_units = 1.0, most_units = 1e6;         // [1/m]
 
-template <class T>
-T value_at(std::span<const std::byte> bytes, std::size_t at, bool swapped = false) {
-  std::array<std::byte, sizeof(T)> copy{};
-  std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), sizeof(T), copy.begin());
-  if (swapped) std::reverse(copy.begin(), copy.end());
-  return std::bit_cast<T>(copy);
+std::endian order_of(bool is_bigendian) {
+  return is_bigendian ? std::endian::big : std::endian::little;
 }
 
 std::uint16_t quantised(double metres, double units) {
@@ -94,13 +90,13 @@ std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
                 "name a topic of 16UC1 or 32FC1 with ?topic=");
   const std::size_t size = floats ? 4 : 2;
   check_size(image, size, name);
-  const bool swapped = (image.is_bigendian != 0) != (std::endian::native == std::endian::big);
+  const std::endian order = order_of(image.is_bigendian != 0);
   std::vector<std::uint16_t> depth(std::size_t{image.width} * image.height);
   for (std::size_t v = 0, i = 0; v < image.height; ++v) {
     for (std::size_t u = 0; u < image.width; ++u, ++i) {
-      const std::size_t at = v * image.step + u * size;
-      depth[i] = floats ? quantised(value_at<float>(image.data, at, swapped), units)
-                        : value_at<std::uint16_t>(image.data, at, swapped);
+      const std::byte* const at = &image.data[v * image.step + u * size];
+      depth[i] = floats ? quantised(detail::load<float>(at, order), units)
+                        : detail::load<std::uint16_t>(at, order);
     }
   }
   return depth;
@@ -123,8 +119,8 @@ ros::Image unpacked(ros::CompressedImage message, double units, const std::strin
                    .data = {}};
   if (is_float(image.encoding)) {
     image.encoding = "16UC1";
-    const double a = value_at<float>(message.data, 4);
-    const double b = value_at<float>(message.data, 8);
+    const double a = detail::load<float>(&message.data[4], std::endian::native);
+    const double b = detail::load<float>(&message.data[8], std::endian::native);
     for (std::uint16_t& d : raw.depth) d = d == 0 ? d : quantised(a / (d - b), units);
   }
   const auto bytes = std::as_bytes(std::span(raw.depth));
@@ -143,7 +139,7 @@ void read_points(const ros::PointCloud2& message, const std::string& name, RosFr
   const std::size_t row_step = message.height > 1 ? message.row_step : row;
   if (row > message.data.size() || message.height - 1 > (message.data.size() - row) / row_step)
     throw Error(name, "declares more points than it contains", "it may be damaged");
-  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
+  const std::endian order = order_of(message.is_bigendian);
   const auto colour =
       std::find_if(message.fields.begin(), message.fields.end(), [&](const auto& f) {
         return (f.name == "rgb" || f.name == "rgba") &&
@@ -153,16 +149,16 @@ void read_points(const ros::PointCloud2& message, const std::string& name, RosFr
   points.reserve(std::size_t{message.width} * message.height);
   for (std::size_t v = 0; v < message.height; ++v) {
     for (std::size_t u = 0; u < message.width; ++u) {
-      const std::size_t at = v * row_step + u * message.point_step;
+      const std::byte* const at = &message.data[v * row_step + u * message.point_step];
       Vec3& point = points.emplace_back();
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::size_t place = at + axes.offset[axis];
-        point[static_cast<Eigen::Index>(axis)] =
-            axes.is_double[axis] ? value_at<double>(message.data, place, swapped)
-                                 : double{value_at<float>(message.data, place, swapped)};
+        const std::byte* const place = at + axes.offset[axis];
+        point[static_cast<Eigen::Index>(axis)] = axes.is_double[axis]
+                                                     ? detail::load<double>(place, order)
+                                                     : double{detail::load<float>(place, order)};
       }
       if (colour == message.fields.end()) continue;
-      const auto packed = value_at<std::uint32_t>(message.data, at + colour->offset, swapped);
+      const auto packed = detail::load<std::uint32_t>(at + colour->offset, order);
       for (const unsigned shift : {16U, 8U, 0U})
         frame.rgb.push_back(static_cast<std::uint8_t>(packed >> shift));
     }

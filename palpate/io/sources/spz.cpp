@@ -4,7 +4,6 @@
 #include <numbers>
 
 #include "palpate/io/bag/compression.hpp"
-#include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -12,7 +11,6 @@
 namespace palpate {
 namespace {
 
-constexpr std::uintmax_t largest_spz = std::uintmax_t{1} << 31;
 constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
 constexpr std::size_t header_size = 16;      // [bytes] that all versions have
 
@@ -145,7 +143,7 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
       const double harmonic = (std::to_integer<int>(colours[3 * i + k]) / 255.0 - 0.5) / 0.15;
       cloud.colours.push_back(detail::colour_byte(detail::colour_share(harmonic)));
     }
-    Eigen::Vector4d turn;
+    Eigen::Vector4d turn;  // x, y, z, w
     const std::byte* const at = &turns[turn_size * i];
     if (version >= 3) {
       turn = smallest_three(detail::load<std::uint32_t>(at, little));
@@ -156,17 +154,11 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
     }
     const double opacity = std::to_integer<int>(opacities[i]) / 255.0;
     cloud.points.push_back(place);
-    splat.log_scales.push_back(scale);
-    splat.heads.emplace_back(turn[3], std::log(opacity / (1.0 - opacity)), 0.0);
-    splat.rotations.emplace_back(turn.head<3>());
+    splat.add(scale, opacity, Eigen::Quaterniond(turn));
   }
   cloud.width = count;
   cloud.non_finite = detail::count_non_finite(cloud.points);
   return cloud;
-}
-
-PointFile read_spz(const std::filesystem::path& path) {
-  return parse_spz(read_file(path, largest_spz), path.string());
 }
 
 }  // namespace palpate

@@ -6,15 +6,12 @@
 #include <string>
 #include <tuple>
 
-#include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {
-
-constexpr std::uintmax_t largest_stl = std::uintmax_t{1} << 28;
 
 // Joins corners that are at the same place.
 class Welder {
@@ -92,10 +89,6 @@ PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name) {
   }
   file.width = file.points.size();
   return file;
-}
-
-PointFile read_stl(const std::filesystem::path& path) {
-  return parse_stl(read_file(path, largest_stl), path.string());
 }
 
 }  // namespace palpate

@@ -4,7 +4,9 @@
 #include <span>
 
 #include "app/verbs.hpp"
+#include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/method.hpp"
 
 namespace palpate::app {
 
@@ -16,6 +18,10 @@ namespace palpate::app {
 /// @return the exit status: 0 done, 1 failed while running, 2 wrong usage or input, 128 and a
 ///         signal's number where that signal ended work before it was whole
 int run_program(int argc, char** argv, std::span<const AddVerb> own_verbs = {});
+
+/// The methods that this program knows by name.
+/// @param camera  what will be touched, for `ideal`, which needs the truth; null: not known
+MethodRegistry program_methods(const Source* camera = nullptr);
 
 /// A method that this program does not know; palpate-lab may.
 class UnknownMethod : public Error {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/program_methods.hpp"
-
+#include "app/program.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 
 namespace palpate::app {

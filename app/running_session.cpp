@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "app/program_methods.hpp"
+#include "app/program.hpp"
 #include "app/summary_text.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/devices/device_guard.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "app/session_arguments.hpp"
+#include "app/options.hpp"
 #include "palpate/kernel/core/method.hpp"
 #include "palpate/net/viewer/session_host.hpp"
 #include "palpate/servo/device.hpp"

@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/session_arguments.hpp"
+#include "app/options.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/sources/source.hpp"

@@ -5,7 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "app/program_methods.hpp"
+#include "app/program.hpp"
 #include "app/verbs.hpp"
 
 namespace palpate::app {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/program_methods.hpp"
+#include "app/program.hpp"
 #include "app/progress.hpp"
 #include "app/verbs.hpp"
 #include "palpate/kernel/core/vectorise.hpp"

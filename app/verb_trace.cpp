@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 
 #include "app/options.hpp"
-#include "app/program_methods.hpp"
+#include "app/program.hpp"
 #include "app/progress.hpp"
 #include "app/remarks.hpp"
 #include "app/signals.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/io/bag/bag_file.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 #include "palpate/io/bag/compression.hpp"
 #include "palpate/kernel/core/error.hpp"
 

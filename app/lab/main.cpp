@@ -3,7 +3,6 @@
 #include <array>
 
 #include "app/program.hpp"
-#include "app/program_methods.hpp"
 #include "lab/method.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 

@@ -2,6 +2,7 @@
 #include "palpate/drivers/dds.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -191,17 +192,9 @@ std::optional<std::string> client_of(const Library& library, Endpoint* endpoint)
   return client;
 }
 
+// @param size  1, 2, 4 or 8, whose codes follow one another
 std::uint32_t code_of(std::size_t size) {
-  switch (size) {
-    case 1:
-      return cyclone::of_1_byte;
-    case 2:
-      return cyclone::of_2_bytes;
-    case 4:
-      return cyclone::of_4_bytes;
-    default:
-      return cyclone::of_8_bytes;
-  }
+  return cyclone::of_1_byte + static_cast<std::uint32_t>(std::countr_zero(size));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <future>
@@ -13,11 +14,16 @@
 #include <thread>
 #include <utility>
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/use_future.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
 #include <nlohmann/json.hpp>
 
 #include "palpate/drivers/channel_hand.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/drivers/web_socket.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
 
@@ -26,6 +32,8 @@ namespace haply {
 namespace {
 
 using Json = nlohmann::json;
+namespace asio = boost::asio;
+namespace beast = boost::beast;
 
 constexpr std::string_view scheme = "haply:";
 constexpr double opening_time = 2.0;     // [s] for each step of opening
@@ -38,6 +46,139 @@ constexpr double clear_force = 0.05;     // [N] that a device must show to have 
 constexpr int answers_of_doubt = 30;     // in a row without that force
 constexpr double rest_time = 0.2;        // [s] without a hand after anything went wrong
 constexpr auto retry_interval = std::chrono::milliseconds(250);
+
+// Boost.Beast for who wants short texts and no waiting longer than told.
+
+std::string place_of(const std::string& host, int port) {
+  return host + ":" + std::to_string(port);
+}
+
+std::chrono::nanoseconds time_of(double seconds) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
+}
+
+// Lets what was begun end. @throws boost::system::system_error
+template <class Result>
+Result finish(asio::io_context& context, std::future<Result> begun) {
+  context.restart();
+  context.run();
+  return begun.get();
+}
+
+// Connects, and bounds what is done next on the stream. @param timeout  [s] for each of both
+// @throws Error naming the place if there is no such host, or nobody answers
+void connect(asio::io_context& context, beast::tcp_stream& stream, const std::string& host,
+             int port, double timeout) {
+  try {
+    asio::ip::tcp::resolver resolver(context);
+    const auto addresses = resolver.resolve(host, std::to_string(port));
+    stream.expires_after(time_of(timeout));
+    finish(context, stream.async_connect(addresses, asio::use_future));
+    stream.socket().set_option(asio::ip::tcp::no_delay(true));
+    stream.expires_after(time_of(timeout));
+  } catch (const boost::system::system_error& error) {
+    throw Error(place_of(host, port), "nobody answers (" + error.code().message() + ")");
+  }
+}
+
+// The body of what `GET target` is answered with. @throws Error as WebSocket
+std::string http_get(const std::string& host, int port, const std::string& target, double timeout) {
+  namespace http = beast::http;
+  asio::io_context context;
+  beast::tcp_stream stream(context);
+  connect(context, stream, host, port, timeout);
+  http::request<http::empty_body> request(http::verb::get, target, 11);
+  request.set(http::field::host, place_of(host, port));
+  request.set(http::field::accept, "application/json");
+  http::response<http::string_body> response;
+  try {
+    beast::flat_buffer buffer;
+    finish(context, http::async_write(stream, request, asio::use_future));
+    finish(context, http::async_read(stream, buffer, response, asio::use_future));
+  } catch (const boost::system::system_error&) {
+    response.result(http::status::unknown);
+  }
+  if (response.result() != http::status::ok)
+    throw Error(place_of(host, port), "it does not tell " + target);
+  return response.body();
+}
+
+// A client's end of a WebSocket, without TLS. One thread; nothing waits for longer than it is
+// told.
+class WebSocket {
+ public:
+  // Connects and shakes hands. @param timeout  [s] for each of both, and for each text to be sent
+  // @throws Error naming the place if there is no such host, nobody answers, or not as one does
+  WebSocket(const std::string& host, int port, double timeout)
+      : place_(place_of(host, port)), timeout_(timeout) {
+    connect(context_, beast::get_lowest_layer(socket_), host, port, timeout);
+    constexpr std::size_t largest_message = std::size_t{1} << 20U;  // [byte]
+    socket_.read_message_max(largest_message);
+    try {
+      finish(context_, socket_.async_handshake(place_, "/", asio::use_future));
+    } catch (const boost::system::system_error& error) {
+      throw Error(place_,
+                  "the server does not answer as a WebSocket (" + error.code().message() + ")");
+    }
+    beast::get_lowest_layer(socket_).expires_never();
+    context_.restart();
+    read();
+  }
+
+  // @throws Error if the other end is gone or takes nothing for the constructor's time-out
+  void send(std::string text) {
+    sending_ = std::move(text);
+    is_sent_ = false;
+    socket_.async_write(asio::buffer(sending_), [this](beast::error_code error, std::size_t) {
+      is_sent_ = true;
+      if (error) failure_ = error;
+    });
+    if (!wait(timeout_, [this] { return is_sent_; }))
+      throw Error(place_, "the service takes no messages");
+  }
+
+  // The newest text that comes within `timeout` [s]; older ones are left out. Empty: none came.
+  // @throws Error if the other end is gone
+  std::string receive(double timeout) {
+    wait(timeout, [this] { return !newest_.empty(); });
+    return std::exchange(newest_, {});
+  }
+
+ private:
+  // Reads for as long as somebody waits.
+  void read() {
+    socket_.async_read(buffer_, [this](beast::error_code error, std::size_t) {
+      if (error) {
+        failure_ = error;
+        return;
+      }
+      if (socket_.got_text()) newest_ = beast::buffers_to_string(buffer_.data());
+      buffer_.consume(buffer_.size());
+      read();
+    });
+  }
+
+  // Up to `timeout` [s], and takes what has come by then. @return is it done?
+  template <class Done>
+  bool wait(double timeout, const Done& is_done) {
+    const auto end = std::chrono::steady_clock::now() + time_of(timeout);
+    while (!is_done() && !failure_ && context_.run_one_until(end) > 0) {
+    }
+    context_.poll();
+    if (failure_) throw Error(place_, "the service went away (" + failure_.message() + ")");
+    return is_done();
+  }
+
+  std::string place_;  // "localhost:10001"
+  double timeout_;     // [s]
+  asio::io_context context_;
+  beast::websocket::stream<beast::tcp_stream, false> socket_{context_};  // without compression
+  beast::flat_buffer buffer_;
+  std::string newest_;  // that has come and was not asked for yet
+  std::string sending_;
+  bool is_sent_ = true;
+  beast::error_code failure_;
+};
 
 struct Wanted {
   std::string uri = {}, id = {}, host = "localhost";
@@ -70,17 +211,16 @@ const char* remedy() {
 // What the service says of its version, or nothing.
 std::string version_of(const Wanted& wanted) {
   try {
-    return Json::parse(web::http_get(wanted.host, wanted.port, "/version", 1.0))
-        .value("git_tag", "");
+    return Json::parse(http_get(wanted.host, wanted.port, "/version", 1.0)).value("git_tag", "");
   } catch (const std::exception&) {
     return "";
   }
 }
 
 // @throws Error with the remedy
-std::unique_ptr<web::WebSocket> connect(const Wanted& wanted) {
+std::unique_ptr<WebSocket> connected(const Wanted& wanted) {
   try {
-    return std::make_unique<web::WebSocket>(wanted.host, wanted.port, opening_time);
+    return std::make_unique<WebSocket>(wanted.host, wanted.port, opening_time);
   } catch (const Error& error) {
     throw Error(wanted.uri, std::string("no Inverse Service at ") + error.what(), remedy());
   }
@@ -99,7 +239,7 @@ int number_of_version(const std::string& text) {
 }
 
 // What the service says first. @throws Error if it does not
-Json inventory_of(web::WebSocket& service, const Wanted& wanted) {
+Json inventory_of(WebSocket& service, const Wanted& wanted) {
   const std::string text = service.receive(opening_time);
   if (text.empty())
     throw Error(wanted.uri, "the service does not speak first, as an Inverse Service does",
@@ -222,8 +362,8 @@ class Inverse final : public ChannelHand {
 
   // One connection, to its end.
   void converse(std::promise<void>*& waiting) {
-    const std::unique_ptr<web::WebSocket> service = connect(wanted_);
-    web::WebSocket& channel = *service;
+    const std::unique_ptr<WebSocket> service = connected(wanted_);
+    WebSocket& channel = *service;
     const Json inventory = inventory_of(channel, wanted_);
     if (waiting != nullptr) {
       identify(inventory);
@@ -373,8 +513,7 @@ class Inverse final : public ChannelHand {
 };
 
 Wanted wanted_by(const Uri& uri) {
-  constexpr std::array<std::string_view, 3> options{"host", "port", "max_force"};
-  uri.allow_only(options);
+  uri.allow_only(std::to_array<std::string_view>({"host", "port", "max_force"}));
   Wanted wanted = usual_place();
   wanted.uri = uri.text();
   wanted.id = uri.path();
@@ -389,12 +528,11 @@ std::unique_ptr<Device> open_inverse(const Uri& uri) {
 }
 
 DriverReport look() {
-  DriverReport report;
   Wanted wanted = usual_place();
   wanted.uri = scheme;
-  const std::unique_ptr<web::WebSocket> service = connect(wanted);
-  report.library = "ws://" + wanted.host + ":" + std::to_string(wanted.port);
-  report.version = version_of(wanted);
+  const std::unique_ptr<WebSocket> service = connected(wanted);
+  DriverReport report{.library = "ws://" + place_of(wanted.host, wanted.port),
+                      .version = version_of(wanted)};
   for (const Json& device : devices_in(inventory_of(*service, wanted))) {
     const std::string id = device.value("device_id", "");
     PluggedIn one{.uri = std::string(scheme) + id, .name = "Inverse3", .serial = id};

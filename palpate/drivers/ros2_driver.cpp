@@ -74,10 +74,9 @@ std::string with_name(std::string_view topic, const std::string& name) {
 }
 
 HandOptions hand_options(const Uri& uri) {
-  constexpr std::array<std::string_view, 10> options{
-      "name",   "pose", "pose_type", "force",   "force_type",
-      "button", "axes", "max_force", "silence", "wait"};
-  uri.allow_only(options);
+  uri.allow_only(
+      std::to_array<std::string_view>({"name", "pose", "pose_type", "force", "force_type", "button",
+                                       "axes", "max_force", "silence", "wait"}));
   Ros2Hand hand{.name = "",
                 .node = "a node of its own",
                 .pose = "",

@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/devices/hip_path.hpp"
-#include "palpate/io/sources/mesh_body.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/session/camera_feed.hpp"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/io/sources/mesh_body.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/pose.hpp"
 

@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "palpate/io/bag/bag_file.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {

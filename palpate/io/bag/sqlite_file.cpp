@@ -5,7 +5,7 @@
 
 #include <sqlite3.h>
 
-#include "palpate/io/bag/bag_file.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {

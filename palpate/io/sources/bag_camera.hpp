@@ -10,7 +10,6 @@
 
 #include "palpate/io/bag/bag_reader.hpp"
 #include "palpate/io/bag/messages.hpp"
-#include "palpate/io/sources/bag_colour.hpp"
 #include "palpate/io/sources/ros_frames.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/transforms.hpp"
@@ -20,6 +19,8 @@
 #include "palpate/kernel/core/uri.hpp"
 
 namespace palpate {
+
+class BagColour;
 
 /// Names of the topics of camera `number`, from 0, in a recording of palpate's own.
 struct CameraTopics {
@@ -66,6 +67,7 @@ class BagCamera {
   /// @param bag  must outlive this
   /// @throws Error if the topic is not there, is none of a camera's, or has no CameraInfo.
   BagCamera(BagReader& bag, const std::string& topic, const Options& options);
+  ~BagCamera();
 
   /// The topics that can be opened.
   static std::vector<std::string> topics_of(const BagReader& bag);
@@ -111,7 +113,7 @@ class BagCamera {
   std::vector<BagReader::Place> places_, info_places_, exact_places_, units_places_;
   bool is_realsense_ = false;
   std::optional<BagTransforms> transforms_;
-  std::optional<BagColour> colour_;
+  std::unique_ptr<BagColour> colour_;
   std::string colour_note_;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
   OrganisedClouds organised_;

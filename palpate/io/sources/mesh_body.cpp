@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/io/sources/mesh_body.hpp"
-
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "palpate/io/sources/point_file.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
 #include "palpate/kernel/fixtures/closed_mesh.hpp"

@@ -47,29 +47,12 @@ constexpr std::array usb_names = {
     UsbName{"2988", "", "haptic device", "3D Systems Touch"},
 };
 
-std::string first_line(const fs::path& file) {
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  return line;
-}
-
 // The number that a file consists of; 0 where there is none.
 double number_in(const fs::path& file) {
   const std::string text = first_line(file);
   double value = 0.0;
   std::from_chars(text.data(), text.data() + text.size(), value);
   return value;
-}
-
-std::vector<fs::path> entries(const fs::path& folder) {
-  std::vector<fs::path> found;
-  std::error_code error;
-  for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::end(entry);
-       entry.increment(error))
-    found.push_back(entry->path());
-  std::sort(found.begin(), found.end());
-  return found;
 }
 
 void look_at_processor(const fs::path& root, Machine& machine) {
@@ -83,12 +66,12 @@ void look_at_processor(const fs::path& root, Machine& machine) {
     if (line.rfind("flags", 0) == 0 && value.find("hypervisor ") != std::string::npos)
       machine.is_virtual = true;
   }
-  for (const fs::path& core : entries(root / "sys/devices/system/cpu")) {
+  for (const fs::path& core : entries_of(root / "sys/devices/system/cpu")) {
     const std::string governor = first_line(core / "cpufreq/scaling_governor");
     const auto known = std::find(machine.governors.begin(), machine.governors.end(), governor);
     if (!governor.empty() && known == machine.governors.end())
       machine.governors.push_back(governor);
-    for (const fs::path& state : entries(core / "cpuidle")) {
+    for (const fs::path& state : entries_of(core / "cpuidle")) {
       if (first_line(state / "disable") != "1")
         machine.deepest_sleep =
             std::max(machine.deepest_sleep, 1e-6 * number_in(state / "latency"));
@@ -111,7 +94,7 @@ void look_at_kernel(const fs::path& root, Machine& machine) {
 }
 
 void look_at_devices(const fs::path& root, Machine& machine) {
-  for (const fs::path& entry : entries(root / "sys/class/video4linux"))
+  for (const fs::path& entry : entries_of(root / "sys/class/video4linux"))
     machine.devices.push_back(
         {"/dev/" + entry.filename().string(), first_line(entry / "name"), "camera", {}});
   for (const std::string& id : usb_ids(root)) {
@@ -142,7 +125,7 @@ std::optional<unsigned> coalescing_of(const std::string& name) {
 }
 
 void look_at_network(const fs::path& root, Machine& machine) {
-  for (const fs::path& card : entries(root / "sys/class/net")) {
+  for (const fs::path& card : entries_of(root / "sys/class/net")) {
     std::error_code error;
     const fs::path driver = fs::read_symlink(card / "device/driver", error);
     const std::string name = card.filename().string();
@@ -180,7 +163,7 @@ std::map<std::string, std::uint64_t> interrupts_on(int core, const fs::path& roo
 
 std::uint64_t times_throttled(const fs::path& root) {
   std::uint64_t times = 0;
-  for (const fs::path& core : entries(root / "sys/devices/system/cpu"))
+  for (const fs::path& core : entries_of(root / "sys/devices/system/cpu"))
     for (const char* cause : {"core", "package"})
       times += static_cast<std::uint64_t>(
           number_in(core / "thermal_throttle" / (std::string(cause) + "_throttle_count")));

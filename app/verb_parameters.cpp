@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -42,36 +42,35 @@ std::function<DriverReport()> reporting(std::function<DriverReport()> look) {
     try {
       return look();
     } catch (const std::exception& error) {
-      DriverReport report;
-      report.problem = error.what();
-      return report;
+      return {.problem = error.what()};
     }
   };
 }
-namespace {
 
 namespace fs = std::filesystem;
 
-std::string usb_attribute(const fs::path& file) {
+std::string first_line(const fs::path& file) {
   std::ifstream in(file);
   std::string line;
   std::getline(in, line);
   return line;
 }
 
-}  // namespace
-
-std::vector<std::string> usb_ids(const fs::path& root) {
+std::vector<fs::path> entries_of(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code error;
-  for (auto entry = fs::directory_iterator(root / "sys/bus/usb/devices", error);
-       !error && entry != fs::end(entry); entry.increment(error))
+  for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::end(entry);
+       entry.increment(error))
     found.push_back(entry->path());
   std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<std::string> usb_ids(const fs::path& root) {
   std::vector<std::string> ids;
-  for (const fs::path& entry : found) {
-    const std::string vendor = usb_attribute(entry / "idVendor");
-    if (!vendor.empty()) ids.push_back(vendor + ":" + usb_attribute(entry / "idProduct"));
+  for (const fs::path& entry : entries_of(root / "sys/bus/usb/devices")) {
+    const std::string vendor = first_line(entry / "idVendor");
+    if (!vendor.empty()) ids.push_back(vendor + ":" + first_line(entry / "idProduct"));
   }
   return ids;
 }

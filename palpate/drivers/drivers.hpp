@@ -75,6 +75,11 @@ std::unique_ptr<Source> opened(const Uri& uri) {
 /// A look that says what `look` throws as the report's problem.
 std::function<DriverReport()> reporting(std::function<DriverReport()> look);
 
+/// The first line of a file, such as the system's own; empty where there is none.
+std::string first_line(const std::filesystem::path& file);
+/// What is in a folder, by name; nothing where there is none.
+std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
+
 /// What is plugged in by USB: vendor and product of each, such as "8086:0b07", as the system below
 /// `root` shows them. Never throws for what is missing.
 std::vector<std::string> usb_ids(const std::filesystem::path& root = "/");

@@ -473,9 +473,8 @@ class Arm final : public Device {
 };
 
 std::unique_ptr<Device> open_arm(const Uri& uri) {
-  constexpr std::array<std::string_view, 4> options{"calibrate", "gravity", "watchdog",
-                                                    "max_force"};
-  uri.allow_only(options);
+  uri.allow_only(
+      std::to_array<std::string_view>({"calibrate", "gravity", "watchdog", "max_force"}));
   Wanted wanted{.uri = uri.text(), .serial = {}};
   if (const std::string& serial = uri.path(); !serial.empty()) {
     if (serial.size() > 5 || serial.find_first_not_of("0123456789") != std::string::npos)
@@ -497,9 +496,7 @@ std::unique_ptr<Device> open_arm(const Uri& uri) {
 
 DriverReport look() {
   const Sdk sdk;
-  DriverReport report;
-  report.library = sdk.library.path();
-  report.version = sdk.version();
+  DriverReport report{.library = sdk.library.path(), .version = sdk.version()};
   const int count = std::max(sdk.get_device_count(), 0);
   for (int i = 0; i < count; ++i) {
     const int id = sdk.open_id(static_cast<char>(i));

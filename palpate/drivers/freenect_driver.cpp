@@ -145,8 +145,7 @@ class Camera final : public LiveCamera {
                     .range = measurable}),
         context_(context_of(api_)),
         kinect_(nullptr, api_.close) {
-    constexpr std::array<std::string_view, 1> known{"depth"};
-    uri.allow_only(known);
+    uri.allow_only(std::to_array<std::string_view>({"depth"}));
     const std::string kind = uri.text_option("depth", "mm");
     if (kind != "mm" && kind != "registered" && kind != "11bit")
       throw Error(info_.uri, "there is no depth '" + kind + "'",

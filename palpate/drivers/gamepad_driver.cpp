@@ -143,11 +143,10 @@ std::unique_ptr<Device> open_pad(const Uri& uri) {
 
 DriverReport look() {
   const Sdl sdl;
-  DriverReport report;
-  report.library = sdl.library.path();
   Version version{};
   sdl.get_version(&version);
-  report.version = version_text({version.major, version.minor, version.patch});
+  DriverReport report{.library = sdl.library.path(),
+                      .version = version_text({version.major, version.minor, version.patch})};
   for (int number = 0; sdl.index_of(number) >= 0; ++number) {
     void* pad = sdl.open(sdl.index_of(number));
     if (pad == nullptr) continue;

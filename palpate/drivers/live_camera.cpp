@@ -44,4 +44,16 @@ std::vector<std::uint16_t> depth_rows(const void* data, int width, int height, s
   return depth;
 }
 
+std::shared_ptr<ColourImage> colour_rows(const void* data, int width, int height, int stride) {
+  if (data == nullptr || width < 1 || height < 1 || stride < 3 * width) return nullptr;
+  auto image = std::make_shared<ColourImage>();
+  image->width = width;
+  image->height = height;
+  image->rgb.reserve(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const auto* from = static_cast<const std::uint8_t*>(data);
+  for (int v = 0; v < height; ++v, from += stride)
+    image->rgb.insert(image->rgb.end(), from, from + 3 * width);
+  return image;
+}
+
 }  // namespace palpate

@@ -38,4 +38,7 @@ class LiveCamera : public Source {
 std::vector<std::uint16_t> depth_rows(const void* data, int width, int height, std::size_t stride,
                                       const std::string& camera);
 
+/// The same of a colour image: red, green, blue. Null if it is none.
+std::shared_ptr<ColourImage> colour_rows(const void* data, int width, int height, int stride);
+
 }  // namespace palpate

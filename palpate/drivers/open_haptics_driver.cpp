@@ -470,8 +470,7 @@ class Pen final : public Device {
 };
 
 std::unique_ptr<Device> open_pen(const Uri& uri) {
-  constexpr std::array<std::string_view, 2> options{"slew", "max_force"};
-  uri.allow_only(options);
+  uri.allow_only(std::to_array<std::string_view>({"slew", "max_force"}));
   Wanted wanted{.uri = uri.text(), .name = uri.path()};
   wanted.slew = uri.number_option("slew", wanted.slew, 10.0, 2000.0, "N/s");
   if (uri.has("max_force")) wanted.max_force = uri.number_option("max_force", 1.0, 0.1, 30.0, "N");
@@ -479,9 +478,8 @@ std::unique_ptr<Device> open_pen(const Uri& uri) {
 }
 
 DriverReport look() {
-  DriverReport report;
   const auto hd = std::make_shared<const Hd>();
-  report.library = hd->library.path();
+  DriverReport report{.library = hd->library.path()};
   const unsigned handle = hd->init_device(nullptr);
   const unsigned error = hd->take_errors();
   if (error != success || handle == invalid_handle) {

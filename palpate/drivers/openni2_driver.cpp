@@ -176,8 +176,7 @@ class Camera final : public LiveCamera {
         device_(nullptr, api_.device_close),
         depth_(nullptr, api_.stream_destroy),
         colour_(nullptr, api_.stream_destroy) {
-    constexpr std::array<std::string_view, 5> known{"width", "height", "fps", "colour", "sensor"};
-    uri.allow_only(known);
+    uri.allow_only(std::to_array<std::string_view>({"width", "height", "fps", "colour", "sensor"}));
     info_.sensor = sensor_option(uri, info_.sensor);
     open_device(uri.path());
     DeviceInfo info{};
@@ -387,19 +386,10 @@ class Camera final : public LiveCamera {
   }
 
   void keep_colour(const ImageFrame& image) {
-    const auto row = static_cast<std::size_t>(3 * std::max(image.width, 0));
-    const auto height = static_cast<std::size_t>(std::max(image.height, 0));
-    if (image.mode.format != format_rgb888 || image.data == nullptr ||
-        image.stride < static_cast<int>(row) ||
-        static_cast<std::size_t>(image.size) < height * static_cast<std::size_t>(image.stride))
-      return;
-    auto colour = std::make_shared<ColourImage>();
-    colour->width = image.width;
-    colour->height = image.height;
-    const auto* from = static_cast<const std::uint8_t*>(image.data);
-    for (std::size_t v = 0; v < height; ++v, from += image.stride)
-      colour->rgb.insert(colour->rgb.end(), from, from + row);
-    seen_ = std::move(colour);
+    const auto bytes = std::int64_t{image.height} * image.stride;
+    if (image.mode.format != format_rgb888 || image.size < bytes) return;
+    if (auto rows = colour_rows(image.data, image.width, image.height, image.stride))
+      seen_ = std::move(rows);
   }
 
   const Api api_;

@@ -359,9 +359,8 @@ class Camera final : public LiveCamera {
   }
 
   void open(const Uri& uri) {
-    constexpr std::array<std::string_view, 7> known{"width",  "height", "fps",     "colour",
-                                                    "preset", "laser",  "exposure"};
-    uri.allow_only(known);
+    uri.allow_only(std::to_array<std::string_view>(
+        {"width", "height", "fps", "colour", "preset", "laser", "exposure"}));
     const auto whole = [&](std::string_view key, double most, std::string_view unit) {
       return static_cast<int>(std::lround(uri.number_option(key, 0.0, 0.0, most, unit)));
     };
@@ -525,24 +524,13 @@ class Camera final : public LiveCamera {
   }
 
   std::shared_ptr<ColourImage> colour_of(const LibraryFrame* part, const StreamProfile* profile) {
-    const int width = api_.get_frame_width(part);
-    const int height = api_.get_frame_height(part);
-    const int stride = api_.get_frame_stride(part);
-    const auto* data = static_cast<const std::uint8_t*>(api_.get_frame_data(part));
-    if (data == nullptr || width < 1 || height < 1 || stride < 3 * width) return nullptr;
-    auto image = std::make_shared<ColourImage>();
-    image->width = width;
-    image->height = height;
-    const auto row = static_cast<std::size_t>(3 * width);
-    image->rgb.resize(row * static_cast<std::size_t>(height));
-    for (int v = 0; v < height; ++v, data += stride)
-      std::copy_n(data, row, image->rgb.begin() + static_cast<std::ptrdiff_t>(row) * v);
+    auto image = colour_rows(api_.get_frame_data(part), api_.get_frame_width(part),
+                             api_.get_frame_height(part), api_.get_frame_stride(part));
+    if (!image) return nullptr;
     // Colour is to be looked at: a distortion that has no equal here is left out.
     RealSenseLens lens = lens_of(intrinsics_of_profile(profile));
     if (lens.model != "Brown Conrady") lens.coeffs = {};
-    ColourImage::Camera beside;
-    beside.intrinsics = intrinsics_of(lens, info_.uri);
-    image->camera = beside;
+    image->camera.emplace().intrinsics = intrinsics_of(lens, info_.uri);
     return image;
   }
 

@@ -60,9 +60,8 @@ struct CameraOptions {
 };
 
 CameraOptions camera_options(const Uri& uri) {
-  constexpr std::array<std::string_view, 7> options{"reliable", "info", "units", "fixed_frame",
-                                                    "stamps",   "wait", "sensor"};
-  uri.allow_only(options);
+  uri.allow_only(std::to_array<std::string_view>(
+      {"reliable", "info", "units", "fixed_frame", "stamps", "wait", "sensor"}));
   CameraOptions wanted{.uri = uri.text(), .topic = uri.path()};
   if (wanted.topic.size() < 2 || wanted.topic.front() != '/')
     throw Error(uri.text(), "names no topic",

@@ -100,8 +100,7 @@ std::unique_ptr<Device> open_puck(const Uri& uri) {
 
 DriverReport look() {
   const Library library;
-  DriverReport report;
-  report.library = library.library.path();
+  DriverReport report{.library = library.library.path()};
   if (library.open() < 0) {
     report.problem =
         "spacenav: its daemon spacenavd does not answer; start it: systemctl start spacenavd";

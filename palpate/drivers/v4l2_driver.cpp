@@ -152,8 +152,7 @@ class Camera final : public LiveCamera {
 
  private:
   static RecordedCamera lens_of(const Uri& uri) {
-    constexpr std::array<std::string_view, 2> known{"intrinsics", "fps"};
-    uri.allow_only(known);
+    uri.allow_only(std::to_array<std::string_view>({"intrinsics", "fps"}));
     if (uri.path().empty())
       throw Error(uri.text(), "no video node is named",
                   "name one as v4l2:/dev/video2; palpate doctor lists those of depth");

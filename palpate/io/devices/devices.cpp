@@ -24,17 +24,15 @@ HipPath path_of(const Uri& uri, const Path& path) {
 }
 
 std::unique_ptr<Device> open_script(const Uri& uri, const Path& path) {
-  constexpr std::array<std::string_view, 1> options{"repeat"};
-  uri.allow_only(options);
+  uri.allow_only(std::to_array<std::string_view>({"repeat"}));
   return std::make_unique<ScriptedDevice>(path_of(uri, path), uri.has("repeat"), uri.text());
 }
 
 std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
-  constexpr std::array<std::string_view, 16> options{
-      "mass",    "stiffness",           "damping",        "tremor",      "seed",       "device",
-      "grip",    "device_mass",         "device_damping", "friction",    "resolution", "delay",
-      "inertia", "device_turn_damping", "turn_stiffness", "turn_damping"};
-  uri.allow_only(options);
+  uri.allow_only(std::to_array<std::string_view>(
+      {"mass", "stiffness", "damping", "tremor", "seed", "device", "grip", "device_mass",
+       "device_damping", "friction", "resolution", "delay", "inertia", "device_turn_damping",
+       "turn_stiffness", "turn_damping"}));
   HandModel model;
   const std::string device = uri.text_option("device", "none");
   const std::string grip = uri.text_option("grip", "");
@@ -88,9 +86,8 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
 }
 
 std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
-  constexpr std::array<std::string_view, 6> options{"x",        "y",         "z",
-                                                    "response", "max_speed", "silence"};
-  uri.allow_only(options);
+  uri.allow_only(
+      std::to_array<std::string_view>({"x", "y", "z", "response", "max_speed", "silence"}));
   if (!uri.path().empty()) {
     throw Error(uri.text(), "a mouse has no '" + uri.path() + "'", "write only mouse:");
   }

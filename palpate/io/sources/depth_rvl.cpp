@@ -2,7 +2,6 @@
 #include "palpate/io/sources/depth_rvl.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "palpate/kernel/core/error.hpp"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -22,19 +23,9 @@
 namespace palpate {
 
 std::string_view name_of(StampClock clock) noexcept {
-  switch (clock) {
-    case StampClock::recording:
-      return "recording";
-    case StampClock::monotonic:
-      return "monotonic";
-    case StampClock::system:
-      return "system";
-    case StampClock::session:
-      return "session";
-    case StampClock::sensor:
-      break;
-  }
-  return "sensor";
+  constexpr std::array<std::string_view, 5> names{"recording", "monotonic", "system", "sensor",
+                                                  "session"};
+  return names[static_cast<std::size_t>(clock)];
 }
 
 SensorKind sensor_option(const Uri& uri, SensorKind known) {

@@ -85,8 +85,7 @@ std::size_t PointFileSource::skip(std::size_t count) {
 }
 
 std::unique_ptr<Source> open_point_files(const Uri& uri) {
-  constexpr std::array<std::string_view, 3> known{"fps", "scale", "sensor"};
-  uri.allow_only(known);
+  uri.allow_only(std::to_array<std::string_view>({"fps", "scale", "sensor"}));
   const PointFileSource::Options options{
       .fps = uri.number_option("fps", 30.0, 1e-3, 1e6, "Hz"),
       .scale = scale_of(uri),

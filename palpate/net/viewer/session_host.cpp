@@ -87,15 +87,8 @@ std::vector<float> path_of(const std::string& uri) {
 }
 
 std::string_view stricter_text(std::string_view limit) {
-  switch (stricter_direction(limit)) {
-    case Stricter::lower:
-      return "lower";
-    case Stricter::higher:
-      return "higher";
-    case Stricter::neither:
-      break;
-  }
-  return "";
+  constexpr std::array<std::string_view, 3> names{"lower", "higher", ""};
+  return names[static_cast<std::size_t>(stricter_direction(limit))];
 }
 
 json row_by_row(const Eigen::Matrix<double, 3, 4>& pose) {

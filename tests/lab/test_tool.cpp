@@ -90,6 +90,13 @@ TEST(ToolCases, AToolStaysBeforeASurfaceThatComesAndAPenaltyDoesNot) {
   EXPECT_EQ(scores.rows[0].size(), scores.columns.size());
 }
 
+TEST(ToolCases, AToolIsNotInABoxThatSlidesIn) {
+  const Table table = run_of("sliding", "tool-cases", 3);
+  EXPECT_EQ(table.number(0, "behind"), 0.0);
+  EXPECT_LT(table.number(0, "longest"), 0.1);
+  EXPECT_EQ(table.number(1, "behind"), 3.0);
+}
+
 TEST(ToolCases, LiftedToolsAreNotPulled) {
   const Table table = run_of("lifting", "tool-cases", 1);
   EXPECT_EQ(table.number(0, "lifts"), 8.0);

@@ -488,6 +488,37 @@ TEST(ShapeTouch, IsStoppedByTheSideOfABodyOfWhichTheEdgeAloneIsSeen) {
 }
 
 // Hazard: tool-pushes
+TEST(ShapeTouch, IsPushedAsideByABoxThatSlidesIn) {
+  for (const char* sensor : {"ideal", "d4xx"}) {
+    for (const double speed : {0.1, 0.3}) {
+      Part box = part(block(Vec3(0.03, 0.04, 0.02)));
+      box.world_from_part.translation() = Vec3(-0.12, 0, 0.02);
+      box.motion = {.direction = Vec3::UnitX(), .start = 3.0, .speed = speed};
+      Stage stage(Scene({part(HalfSpace{}), box}), "box:40x20x5mm", sensor, 0.5, 0.2);
+      const HandPose at = pose({0, 0, -2.5e-3});
+      stage.press(at);
+      double in_it = 0.0, longest = 0.0, before_it = 0.0, aside = 0.0;
+      const Tick last = stage.run(
+          0.12 / speed, [&](double) { return at; },
+          [&](const Tick& tick) {
+            const double side = -0.09 + speed * (tick.t - 3.0);
+            if (side < -0.02) return;
+            const double gap = tick.proxy.x() - 0.02 - side;
+            // A frame is up to an interval old, and its rows take half of one.
+            in_it = gap < -1.5 * speed * frame_time - 3e-3 ? in_it + 1e-3 : 0.0;
+            longest = std::max(longest, in_it);
+            before_it = std::max(before_it, gap);
+            aside = std::max(aside, std::abs(tick.proxy.y()));
+          });
+      EXPECT_LT(longest, 0.05) << sensor << speed;
+      EXPECT_LT(before_it, 0.012) << sensor << speed;
+      EXPECT_LT(aside, 0.02) << sensor << speed;
+      EXPECT_GT(last.force.x(), 12.0) << sensor << speed;
+    }
+  }
+}
+
+// Hazard: tool-pushes
 TEST(ShapeTouch, HardlyFeelsAnArmThatPassesBeforeTheCamera) {
   Part arm = part(Capsule{.radius = 0.03, .half_length = 0.4});
   arm.world_from_part.translation() = Vec3(-0.25, 0, 0.15);

@@ -23,6 +23,13 @@ constexpr double slow_intervals = 4.0;
 constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
 constexpr float flying_spreads = 2.0F;   // [-] that a reading beside an occluder may be nearer
+constexpr float sliding_spreads = 2.0F;  // [-] beside `deepest`, by which a sliding body is nearer
+constexpr float edge_spreads = 4.0F;     // [-] by which it is at its foot, in so many cells
+constexpr int foot = 6;
+constexpr int least_slid = 24;  // cells: two along a frame's way, twelve along an edge
+// Cells that are nearer by more than so many times what may strike a surface: more are an occluder.
+constexpr int most_struck = 16;
+constexpr float far_strikes = 1.5F;
 constexpr int rows_of_tick = 8;          // of cells that take the newest frame in
 constexpr int lag = 1;                   // [cells] by which they follow a tool late
 constexpr double longest_tick = 20e-3;   // [s] over more, nothing is smooth
@@ -59,6 +66,7 @@ constexpr double rim_spreads = 4.0;
 // [-] so much of the tool's normal is across the line of sight.
 constexpr int farthest_side = 8;
 constexpr double least_across = 0.5;
+constexpr int farthest_out = 48;  // [cells] to where a body is pushed away, that slid over a tool
 
 // [m] What comes nearer by more between two frames hides what was there.
 float strike(const SightParameters& parameters) {
@@ -189,6 +197,7 @@ void SeenSurface::start_cell(int u, int v) noexcept {
   all.ray_y[i] = static_cast<float>(ray.y() - half / k.fy);
   all.relief[i] = z > 0.0F ? z - newest_ : unknown;
   all.smooth[i] = all.relief[i];
+  all.slides[i] = unknown;
   all.drift[i] = 0.0F;
   all.frames[i] = z > 0.0F ? 1.0F : 0.0F;
   all.seen[i] = stamp_;
@@ -308,21 +317,81 @@ bool SeenSurface::flies(int u, int v, float z, const SightParameters& parameters
   return is_hidden(u - 1, v) || is_hidden(u + 1, v) || is_hidden(u, v - 1) || is_hidden(u, v + 1);
 }
 
+// Is a reading [m], nearer than what was there, of a body, and not of its edge, where readings are
+// between both?
+bool SeenSurface::is_of_body(int u, int v, float z) const noexcept {
+  int same = 0;
+  for (const auto& [x, y] :
+       {std::pair(u - 1, v), std::pair(u + 1, v), std::pair(u, v - 1), std::pair(u, v + 1)})
+    same += std::abs(read(x, y) - z) < layer + sliding_spreads * spread_ ? 1 : 0;
+  return same >= 3;
+}
+
+// Lets bodies slide over all cells at once: a half-taken one would have sides that are none. Where
+// one is so much nearer that no tool can be pushed along the line of sight, it slid; and so it did
+// beside, down to its foot. Few cells are noise; and while something passes before the surface,
+// nothing is said to slide.
+void SeenSurface::slide() noexcept {
+  if (!slides_) return;
+  slides_ = false;
+  Cells& all = cells_[0];
+  const float high = static_cast<float>(deepest) + sliding_spreads * spread_;
+  const auto is_high = [&](int u, int v) {
+    return u >= u_ && v >= v_ && u < u_ + side && v < v_ + side &&
+           all.smooth[index(u, v)] - all.slides[index(u, v)] > high;
+  };
+  int size = 0;
+  for (std::size_t i = 0; i < count; ++i) size += all.smooth[i] - all.slides[i] > high ? 1 : 0;
+  slid_ = size >= least_slid && struck_ <= most_struck;
+  for (int v = v_; v < v_ + side; ++v) {
+    for (int u = u_; u < u_ + side; ++u) {
+      float& slides = all.slides[index(u, v)];
+      if (!(slides == slides)) continue;
+      bool slid = is_high(u, v);
+      for (int k = 1; k <= foot && !slid; ++k)
+        slid = is_high(u - k, v) || is_high(u + k, v) || is_high(u, v - k) || is_high(u, v + k);
+      if (!slid || !slid_) slides = unknown;
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(all.slides[i] == all.slides[i])) continue;
+    all.relief[i] = all.smooth[i] = all.slides[i];
+    all.slides[i] = unknown;
+    all.drift[i] = 0.0F;
+    all.frames[i] = 1.0F;
+    all.seen[i] = stamp_;
+  }
+}
+
 // Takes further rows of the newest frame in: all at once would be felt as a late tick.
 void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcept {
+  if (rows_read_ == side) return;
   for (; rows > 0 && rows_read_ < side; --rows, ++rows_read_) {
     const int v = v_ + ((rows_read_ - v_) & (side - 1));  // each row of the memory once
     for (int u = u_; u < u_ + side; ++u) {
       const float z = read(u, v);
-      update(index(u, v), flies(u, v, z, parameters) ? 0.0F : z, parameters);
+      const std::size_t i = index(u, v);
+      const bool flying = flies(u, v, z, parameters);
+      const float above = z > 0.0F ? newest_ + cells_[0].smooth[i] - z : 0.0F;
+      if (above > far_strikes * strike(parameters)) ++struck_;
+      if (above > edge_spreads * spread_ && above < strike(parameters) && !flying &&
+          is_of_body(u, v, z)) {
+        cells_[0].slides[i] = z - newest_;
+        slides_ = true;
+      }
+      update(i, flying ? 0.0F : z, parameters);
     }
   }
+  if (rows_read_ < side) return;
+  whole_ = true;
+  slide();
 }
 
 void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp, double interval,
                           const SightParameters& parameters) noexcept {
   const bool goes_on = image_ != nullptr && frames_ > 0 && stamp > stamp_ &&
                        pose_.matrix() == image.world_from_camera().matrix();
+  whole_ = slid_ = false;
   if (goes_on) read_rows(side, parameters);  // what is left of the frame before
   if (!blend_due_) carried_ = level(t_) + offset(t_);
   image_ = &image;
@@ -331,6 +400,7 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
   interval_ = interval;
   if (!goes_on) {
     frames_ = 0;
+    slides_ = whole_ = slid_ = false;
     newest_ = static_cast<float>(in_camera(aim.place).z());
     spread_ = 0.0F;
     const double usual =
@@ -365,12 +435,14 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
     velocity_ = 0.0;
   }
   rows_read_ = 0;
+  struck_ = 0;
 }
 
 void SeenSurface::start_tick(const Aim& aim, double t, const SightParameters& parameters) noexcept {
   if (image_ == nullptr) return;
   Cells& all = cells_[0];
   aim_at(aim);
+  if (!blend_due_) whole_ = slid_ = false;  // else that of the frame before may just have been
   read_rows(rows_of_tick, parameters);
   if (blend_due_) {  // (8): the level goes on from where it was
     blend_due_ = false;
@@ -541,6 +613,37 @@ std::optional<SeenSurface::Fit> SeenSurface::side_near(const Middle& middle,
     at = along;
   }
   return std::nullopt;
+}
+
+// [m] from a place along a way of unit length along the image to the first cell for which
+// `ends(its index, its depth less that of the way there)`; infinite: there is none.
+template <typename Ends>
+double SeenSurface::walk(const Vec3& place, const Vec3& way, Ends ends) const noexcept {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  const Intrinsics& k = image_->intrinsics();
+  const Vec3 p = in_camera(place);
+  if (!(p.z() > nearest_camera)) return none;
+  const double middle = 0.5 * (stride_ - 1);
+  const double x = (k.cx + shift_u_ + k.fx * p.x() / p.z() - middle) / stride_ + 0.5;
+  const double y = (k.cy + shift_v_ + k.fy * p.y() / p.z() - middle) / stride_ + 0.5;
+  const double pitch = cell_at(p.z());
+  for (int i = 0; i < farthest_out; ++i) {
+    const int u = static_cast<int>(std::floor(x + i * way.x()));
+    const int v = static_cast<int>(std::floor(y + i * way.y()));
+    if (u < u_ || v < v_ || u >= u_ + side || v >= v_ + side) return none;
+    if (ends(index(u, v), cells_[0].shown[shown_index(u, v)] - p.z() - i * pitch * way.z()))
+      return (i + 0.5) * pitch * way.norm();
+  }
+  return none;
+}
+
+double SeenSurface::way_out(const Vec3& place, const Vec3& way) const noexcept {
+  const double least = -rim - rim_spreads * noise();
+  return walk(place, way, [least](std::size_t /*cell*/, double gap) { return gap > least; });
+}
+
+double SeenSurface::way_back(const Vec3& place, const Vec3& way) const noexcept {
+  return walk(place, -way, [](std::size_t /*cell*/, double gap) { return gap < -0.5 * deepest; });
 }
 
 // The plane through the cells on a lattice, `step` apart, of so many on either side of the middle.

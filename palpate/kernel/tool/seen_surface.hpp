@@ -48,6 +48,9 @@ class SeenSurface {
   /// Moves the cells with the tool, and their depths on to time `t` [s].
   void start_tick(const Aim& aim, double t, const SightParameters& parameters) noexcept;
   [[nodiscard]] bool active() const noexcept { return image_ != nullptr; }
+  /// Was the last of the newest frame taken in, in this tick? Bodies slide over cells all at once.
+  [[nodiscard]] bool whole() const noexcept { return whole_; }
+  [[nodiscard]] bool slid() const noexcept { return slid_; }  ///< Did any, in this tick?
 
   /// How points of a tool are projected to cells.
   struct View {
@@ -68,6 +71,22 @@ class SeenSurface {
   /// @return none where nothing is known, or the surface cannot touch this side of the tool
   [[nodiscard]] std::optional<Fit> fit(const Vec3& place, const Vec3& outward,
                                        double side_depth) const noexcept;
+  /// [m] from a place in a body to where it is beside it (12); infinite: that is too far away.
+  /// @param way  [-] in the camera's axes, of unit length along its image
+  [[nodiscard]] double way_out(const Vec3& place, const Vec3& way) const noexcept;
+  /// [m] from a place beside a body back to it.
+  [[nodiscard]] double way_back(const Vec3& place, const Vec3& way) const noexcept;
+  /// [m] from cell to cell at a place before the camera.
+  [[nodiscard]] double cell_at(const Vec3& place) const noexcept {
+    return cell_at(in_camera(place).z());
+  }
+  [[nodiscard]] double stamp() const noexcept { return stamp_; }        ///< [s] of the newest frame
+  [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
+  /// A direction from the camera's axes to the world's, and back.
+  [[nodiscard]] Vec3 to_world(const Vec3& way) const noexcept { return pose_.linear() * way; }
+  [[nodiscard]] Vec3 to_camera(const Vec3& way) const noexcept {
+    return pose_.linear().transpose() * way;
+  }
   /// [m] standard deviation of a cell's average.
   [[nodiscard]] double noise() const noexcept;
   /// [m/s] world: how the surface moves.
@@ -78,6 +97,8 @@ class SeenSurface {
   }
 
   static constexpr int side = 128;  // cells along the window, a power of two
+  /// [m] What is deeper behind a surface is not in it, but behind it, or came through its side.
+  static constexpr double deepest = 10e-3;
 
  private:
   static constexpr std::size_t count = std::size_t{side} * side;
@@ -87,6 +108,7 @@ class SeenSurface {
     std::array<float, count> drift;   // [m] mean of the newest deviations from it
     std::array<float, count> frames;  // [-] in the relief
     std::array<float, count> smooth;  // [m] the relief as it is shown
+    std::array<float, count> slides;  // [m] the relief of a body that slides over it; NaN: none
     std::array<double, count> seen;   // [s] stamp of the newest frame that showed it
     std::array<float, count> ray_x;   // [-] of the ray through its middle
     std::array<float, count> ray_y;
@@ -135,7 +157,11 @@ class SeenSurface {
   bool find_level(const Aim& aim, const SightParameters& parameters) noexcept;
   void update(std::size_t i, float z, const SightParameters& parameters) noexcept;
   [[nodiscard]] bool flies(int u, int v, float z, const SightParameters& parameters) const noexcept;
+  [[nodiscard]] bool is_of_body(int u, int v, float z) const noexcept;
+  template <typename Ends>
+  [[nodiscard]] double walk(const Vec3& place, const Vec3& way, Ends ends) const noexcept;
   void read_rows(int rows, const SightParameters& parameters) noexcept;
+  void slide() noexcept;
   [[nodiscard]] Vec3 in_camera(const Vec3& place) const noexcept;
   /// [m] from cell to cell, z [m] before the camera.
   [[nodiscard]] double cell_at(double z) const noexcept {
@@ -157,6 +183,10 @@ class SeenSurface {
   std::array<HeightSample, most_heights> levels_{};  // the newest first
   std::size_t frames_ = 0;
   int rows_read_ = side;   // of the newest frame
+  int struck_ = 0;         // cells of these rows that something hides
+  bool slides_ = false;    // does a body slide over some of them?
+  bool slid_ = false;      // since the last tick
+  bool whole_ = false;     // since then
   float newest_ = 0.0F;    // [m] level of the newest frame
   float spread_ = 0.0F;    // [m] of cells about level and relief
   double wobble_ = 0.0;    // [m] standard deviation of one frame's level

@@ -8,6 +8,7 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/core/mathematics.hpp"
+#include "palpate/kernel/sight/monitor.hpp"
 #include "palpate/kernel/sight/render.hpp"
 
 namespace palpate {
@@ -21,7 +22,9 @@ constexpr double shortest_step = 1e-4;
 constexpr double margin = 4e-3;
 // [m] A point deeper than that behind a surface, and never seen in front of it, is behind another
 // body, not in this one.
-constexpr double deepest = 10e-3;
+constexpr double deepest = SeenSurface::deepest;
+constexpr double aside = 1e-3;  // [m] that a body which slides pushes a tool in a tick at most
+constexpr std::size_t slid_over_of_patch = 4;  // points, the coarsest, that are looked at
 // [points/tick] over which a tick's steps are taken: 100 us at 10 ns.
 constexpr std::size_t scanned = 10'000;
 // Points of each patch that tell whether a hand is in free space.
@@ -76,6 +79,7 @@ ShapeTouch::ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters&
     : shape_(std::move(shape)), stride_(longest_step) {
   validate(parameters);
   set_parameters(parameters);
+  moves_ = std::clamp<std::size_t>(scanned / shape_->points().size(), 1, most_moves);
   std::size_t longest = 0;
   for (std::size_t patch = 0; patch < most_contacts; ++patch) {
     shell_.begin[patch] = shell_.x.size();
@@ -129,6 +133,7 @@ void ShapeTouch::release(const Pose& hand) noexcept {
   stride_ = longest_step;
   held_ = {};
   contact_count_ = 0;
+  sliding_side_.forget();
 }
 
 void ShapeTouch::observe(const Observation& seen) noexcept {
@@ -171,6 +176,8 @@ void ShapeTouch::scan(const Pose& pose, std::size_t most, Scan& scan, Behind* be
   const auto side_depth = static_cast<float>(parameters_.sight.side_depth);
   const float inside = -static_cast<float>(free_gap) - 2.0F * noise;
   constexpr auto too_deep = static_cast<float>(-deepest);
+  const auto strike = static_cast<float>(-farthest_strike * parameters_.sight.detail);
+  const bool has_side = sliding_side_.size(last_t_) > 0;
   constexpr auto near = static_cast<float>(2.0 * margin);
   for (std::size_t patch = 0; patch < most_contacts; ++patch) {
     const std::size_t begin = shell_.begin[patch];
@@ -198,13 +205,17 @@ void ShapeTouch::scan(const Pose& pose, std::size_t most, Scan& scan, Behind* be
       for (std::size_t i = 0; i < size; ++i) {
         const float gap = gap_[i];
         if (gap == -infinite) continue;
-        const bool was_behind = behind_.is[begin + i] != 0;
+        const std::uint8_t was = behind_.is[begin + i];
+        const bool was_behind = was != in_front;
         if (gap < inside && gap > -side_depth) ++scan.inside;
         if (gap < too_deep && gap > -side_depth && !was_behind) ++scan.crossed;
+        const bool is_slid_over =
+            gap > strike && (was == slid_over || (slid_ && !was_behind && gap < too_deep));
         // Behind until it has been in front again.
-        if (gap < too_deep || (was_behind && gap < 0.0F)) {
+        if (gap < too_deep || (was == Place::behind && gap < 0.0F) ||
+            (is_slid_over && has_side && gap < inside)) {
           if (behind == nullptr) continue;
-          behind->is[begin + i] = 1;
+          behind->is[begin + i] = is_slid_over ? slid_over : Place::behind;
           ++behind->in_patch[patch];
         } else if (gap < least) {
           least = gap;
@@ -248,6 +259,45 @@ void ShapeTouch::find_contacts(const Scan& scan) noexcept {
     if (!fit || fit->gap > margin || !(fit->gap > -2.0 * deepest)) continue;
     contacts_[contact_count_++] = {lever, *fit, scan.camera[i], i};
   }
+  if (taken_in_) find_sliding_side();
+  taken_in_ = slid_ = false;
+  const std::size_t sides = sliding_side_.size(last_t_);
+  for (std::size_t i = 0; i < sides; ++i) {
+    const SlidingSide::Point& point = sliding_side_.point(i);
+    const Vec3 lever = pose_.turn * point.at;
+    const double gap = sliding_side_.gap(i, pose_.at + lever, last_t_);
+    if (gap > margin) continue;
+    contacts_[contact_count_++] = {
+        lever, {gap, sliding_side_.normal(), 0.0, true}, sliding_side_.camera(), point.patch};
+  }
+  // A frame shows all at once what slid in; it pushes by little in a step.
+  for (std::size_t i = 0; i < contact_count_ && sides > 0; ++i)
+    contacts_[i].fit.gap = std::max(contacts_[i].fit.gap, -aside / static_cast<double>(moves_));
+}
+
+// Where a frame that is now taken in shows the side of a body that slid over the tool.
+void ShapeTouch::find_sliding_side() noexcept {
+  std::array<SlidingSide::Point, SlidingSide::most_points> points;
+  std::size_t size = 0;
+  for (std::size_t patch = 0; patch < most_contacts; ++patch) {
+    if (behind_.in_patch[patch] == 0) continue;
+    const std::size_t most = std::min(size + slid_over_of_patch, points.size());
+    const std::size_t end = shell_.begin[patch] + shell_.size[patch];
+    for (std::size_t i = shell_.begin[patch]; i < end && size < most; ++i) {
+      if (behind_.is[i] != slid_over) continue;
+      const Vec3& at = shape_->points()[shell_.point[i]].at;
+      points[size++] = {patch, at, pose_.at + pose_.turn * at};
+    }
+  }
+  std::size_t camera = sliding_side_.camera();
+  for (std::size_t i = 0; i < most_cameras; ++i)
+    if (seen_[i].active() && seen_[i].slid()) camera = i;
+  const SeenSurface& seen = seen_[camera];
+  if (!seen.active() || !seen.whole()) return;
+  if (size > 0)
+    sliding_side_.find(seen, camera, std::span(points.data(), size), support_);
+  else if (sliding_side_.size(last_t_) > 0)
+    sliding_side_.follow(seen, isometry(pose_));
 }
 
 void ShapeTouch::Limits::add(const Contact& of, std::size_t number, const Vec3& direction,
@@ -316,7 +366,7 @@ void ShapeTouch::step(const Pose& hand) noexcept {
   };
   solve();
   // Contacts that push get friction, and those that slide most: until all that push have it.
-  std::bitset<most_contacts> is_rough;
+  std::bitset<most_contacts + SlidingSide::most_held> is_rough;
   const auto roughen = [&](std::size_t number) {
     if (is_rough[number]) return;
     is_rough.set(number);
@@ -343,10 +393,16 @@ void ShapeTouch::step(const Pose& hand) noexcept {
     if (limits.size == before) break;
     solve();
   }
+  support_.setZero();
   for (std::size_t i = 0; i < held_.count; ++i) {
+    const SeenSurface::Fit& fit = contacts_[limits.contact[held_.limit[i]]].fit;
+    if (!fit.wall) support_ += held_.push[i] * fit.normal;
     pushes_[i] = held_.push[i] * limits.limit[held_.limit[i]].direction.head<3>();
     held_.limit[i] = limits.contact[held_.limit[i]];
   }
+  // Limits that contradict one another may ask for any motion.
+  const double way = motion.head<3>().norm() + shape_->reach() / length * motion.tail<3>().norm();
+  if (way > deepest) motion *= deepest / way;
   pose_.at += motion.head<3>();
   pose_.turn = unit(product(rotation_by(motion.tail<3>() / length), pose_.turn));
 }
@@ -369,8 +425,6 @@ bool ShapeTouch::can_follow(const Pose& hand) noexcept {
 
 // Moves the proxy towards the hand until it rests. True if it touches.
 bool ShapeTouch::move(const Pose& hand) noexcept {
-  const std::size_t most =
-      std::clamp<std::size_t>(scanned / shape_->points().size(), 1, most_moves);
   Scan found;
   if (touching_) {
     // A hand in free space pulls its proxy out of whatever it is caught behind.
@@ -385,10 +439,10 @@ bool ShapeTouch::move(const Pose& hand) noexcept {
       return false;
     }
   }
-  for (std::size_t i = 0; i < most; ++i) {
+  for (std::size_t i = 0; i < moves_; ++i) {
     scan(pose_, all, found, &behind_now_);
     ++steps_;
-    if (found.crossed > 0 && !fresh_ && stride_ > shortest_step) {
+    if (found.crossed > 0 && !fresh_ && !slid_ && stride_ > shortest_step) {
       // The step went through the side of a body: shorter steps meet it.
       pose_ = kept_;
       stride_ = std::max(0.25 * stride_, shortest_step);
@@ -408,7 +462,9 @@ bool ShapeTouch::move(const Pose& hand) noexcept {
     step(hand);
     if (way_to(kept_) < at_rest) break;
   }
-  return held_.count > 0;
+  // On its way to a hand that nothing holds it from any more, it still pulls: no force ends at
+  // once.
+  return held_.count > 0 || touching_;
 }
 
 // Hazard: tool-pushes
@@ -462,7 +518,8 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   const double length = turn_length_;  // (2)
   const Vec3 u = pose_.at - hand.at;
   const Vec3 turn = rotation_vector(between(pose_.turn, hand.turn));
-  const Vec3 surface = seen_[contacts_[held_.limit[0]].camera].velocity(t);
+  const Vec3 surface =
+      held_.count > 0 ? seen_[contacts_[held_.limit[0]].camera].velocity(t) : Vec3(Vec3::Zero());
   tick.surface_motion = surface;
   // Each pushes harder while the hand goes deeper, and never pulls.
   const auto push = [&](const Vec3& way, const Vec3& velocity, double stiffness, double damping) {
@@ -527,7 +584,12 @@ Tick ShapeTouch::tick(const HandPose& given, double t) noexcept {
   }
   timing_.tick(t);
   const SeenSurface::Aim aim{loose_ ? hand.at : pose_.at, shape_->reach() + deepest};
-  for (SeenSurface& each : seen_) each.start_tick(aim, t, parameters_.sight);
+  taken_in_ = slid_ = false;
+  for (SeenSurface& each : seen_) {
+    each.start_tick(aim, t, parameters_.sight);
+    taken_in_ = taken_in_ || (each.active() && each.whole());
+    slid_ = slid_ || (each.active() && each.slid());
+  }
   steps_ = 0;
   ++ticks_;
   if (loose_) {

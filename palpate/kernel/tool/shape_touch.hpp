@@ -12,7 +12,7 @@
 #include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/sight/frame_timing.hpp"
 #include "palpate/kernel/tool/least_motion.hpp"
-#include "palpate/kernel/tool/seen_surface.hpp"
+#include "palpate/kernel/tool/sliding_side.hpp"
 #include "palpate/kernel/tool/tool_feel.hpp"
 #include "palpate/kernel/tool/tool_shape.hpp"
 
@@ -63,10 +63,11 @@ class ShapeTouch final : public Method {
     std::array<std::size_t, most_contacts + 1> begin{};  // of each patch
     std::array<std::size_t, most_contacts> size{};       // the same without the rest of a block
   };
-  /// Which points are behind what they never were in front of.
+  enum Place : std::uint8_t { in_front, behind, slid_over };
+  /// Which points are behind what they never were in front of, and which a body slid over.
   struct Behind {
-    std::vector<std::uint8_t> is;                         // of the shell's points
-    std::array<std::uint32_t, most_contacts> in_patch{};  // how many of them
+    std::vector<std::uint8_t> is;                         // Place of the shell's points
+    std::array<std::uint32_t, most_contacts> in_patch{};  // how many of them are not in front
   };
   /// What the tool's points meet at a pose.
   struct Scan {
@@ -83,6 +84,7 @@ class ShapeTouch final : public Method {
   [[nodiscard]] Eigen::Isometry3d isometry(const Pose& pose) const noexcept;
   void scan(const Pose& pose, std::size_t most, Scan& scan, Behind* behind) noexcept;
   void find_contacts(const Scan& scan) noexcept;
+  void find_sliding_side() noexcept;
   [[nodiscard]] double way_to(const Pose& hand) const noexcept;
   [[nodiscard]] bool can_follow(const Pose& hand) noexcept;
   bool move(const Pose& hand) noexcept;
@@ -107,11 +109,16 @@ class ShapeTouch final : public Method {
   bool placed_ = false;
   bool loose_ = true;  // began inside something, or lost it: nothing is felt until it is free
   bool touching_ = false;
-  bool fresh_ = false;   // a frame came since the last scan
-  Pose pose_;            // of the proxy
-  Pose kept_;            // the newest that a scan has shown to be possible
-  double stride_ = 0.0;  // [m] that a point may move in a step
-  std::array<Contact, most_contacts> contacts_{};
+  bool fresh_ = false;           // a frame came since the last scan
+  bool taken_in_ = false;        // the last of one was taken in, in this tick
+  bool slid_ = false;            // and it shows bodies that slid over cells
+  SlidingSide sliding_side_;     // of a body that slid over the tool
+  Vec3 support_ = Vec3::Zero();  // [m] world: what pushed in the last step and was no side
+  Pose pose_;                    // of the proxy
+  Pose kept_;                    // the newest that a scan has shown to be possible
+  double stride_ = 0.0;          // [m] that a point may move in a step
+  std::size_t moves_ = 1;        // steps of a tick at most
+  std::array<Contact, most_contacts + SlidingSide::most_held> contacts_{};
   std::size_t contact_count_ = 0;
   /// The surface under a patch's point, as it was fitted in a tick.
   struct Plane {

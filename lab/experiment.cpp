@@ -52,7 +52,9 @@ std::vector<std::string> methods_of(const Experiment& experiment,
                     "use a program only with pop, fidelity, real or bench-entry");
       continue;
     }
-    if (!is_own) static_cast<void>(methods().find(name));
+    const auto& usual = experiment.default_methods;  // of some these are no methods of the lab
+    if (!is_own && std::find(usual.begin(), usual.end(), name) == usual.end())
+      static_cast<void>(methods().find(name));
   }
   return options.methods;
 }

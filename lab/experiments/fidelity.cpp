@@ -274,7 +274,8 @@ std::string push_by_sine(const std::string& name, const ExperimentOptions& optio
 
 std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<std::string_view> scenes;
-  for (const Measure& measure : measures) scenes.push_back(measure.scene);
+  for (const Measure& measure : measures)
+    if (scenes.empty() || scenes.back() != measure.scene) scenes.push_back(measure.scene);
   check_families(options, "fidelity has no such scene", scenes);
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {

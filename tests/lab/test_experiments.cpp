@@ -178,7 +178,7 @@ TEST_F(Lab, PlaysAndJudgesOnlyTheScenesOfFidelityThatAreAskedFor) {
   options.families = {"sinus"};
   EXPECT_TRUE(test::fails_saying(open, "--families sinus", "did you mean 'sine'? known here: "));
   options.families = {"unheard-of"};
-  EXPECT_TRUE(test::fails_saying(open, "no such scene; known here: "));
+  EXPECT_TRUE(test::fails_saying(open, "no such scene; known here: white-1mm, correlated-1mm"));
 }
 
 TEST_F(Lab, GivesTheSameBytesWithOneJobTwoJobsAndAfterAnInterruption) {

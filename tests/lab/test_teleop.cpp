@@ -158,5 +158,12 @@ TEST(Teleop, MakesItsTable) {
       test::fails_saying([&] { teleop.cells(teleop, options); }, "rust", "no such", "rest"));
 }
 
+TEST(Teleop, OneOfItsCouplingsCanBePlayedAlone) {
+  ExperimentOptions options;
+  options.methods = {"wave"};  // no method of the lab
+  EXPECT_EQ(methods_of(find_experiment("teleop"), options), options.methods);
+  EXPECT_TRUE(test::fails_saying([&] { methods_of(find_experiment("lifts"), options); }, "wave"));
+}
+
 }  // namespace test_teleop
 }  // namespace palpate::lab

@@ -530,7 +530,7 @@ class Camera final : public LiveCamera {
     // Colour is to be looked at: a distortion that has no equal here is left out.
     RealSenseLens lens = lens_of(intrinsics_of_profile(profile));
     if (lens.model != "Brown Conrady") lens.coeffs = {};
-    image->camera.emplace().intrinsics = intrinsics_of(lens, info_.uri);
+    image->camera = ColourImage::Camera{.intrinsics = intrinsics_of(lens, info_.uri)};
     return image;
   }
 

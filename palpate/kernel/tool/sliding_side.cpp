@@ -14,8 +14,8 @@ constexpr double next_cos = 0.92387953251128674;
 constexpr double next_sin = 0.38268343236508977;
 constexpr double steepest_hold = 0.5;  // [-] cosine between the line of sight and what holds a tool
 
-constexpr double newest = 0.5;    // [-] weight of the newest frame in the speed
-constexpr double at_rest = 0.02;  // [m/s] A slower side is a surface like any other.
+constexpr double newest_weight = 0.5;  // [-] of the newest frame in the speed
+constexpr double slowest = 0.02;       // [m/s] A slower side is a surface like any other.
 
 }  // namespace
 
@@ -95,11 +95,11 @@ void SlidingSide::move_to(const SeenSurface& seen, bool is_known) noexcept {
                                       [](const Held& a, const Held& b) { return a.out < b.out; });
   const Vec3 place = front->of.place + front->far * normal_;
   const double passed = std::max(seen.stamp() - stamp_, 0.5 * seen.interval());
-  if (is_known) speed_ += newest * (normal_.dot(place - front_) / passed - speed_);
+  if (is_known) speed_ += newest_weight * (normal_.dot(place - front_) / passed - speed_);
   front_ = place;
   stamp_ = seen.stamp();
   interval_ = seen.interval();
-  if (is_known && speed_ < at_rest) size_ = 0;
+  if (is_known && speed_ < slowest) size_ = 0;
 }
 
 }  // namespace palpate

@@ -205,10 +205,11 @@ std::string rows_of(std::string_view scene_name, std::string_view camera,
                     const std::vector<ZHolding>& holdings, const std::vector<std::string>& names,
                     const ExperimentOptions& options) {
   const ZScene scene(scene_name, camera, options.seed);
-  const double asked = options.parameters.coupling.damping;
+  std::vector<double> dampings = usual_dampings;
+  if (const double asked = options.parameters.coupling.damping; asked > 0.0) dampings = {asked};
   std::string rows;
   for (const ZHolding& holding : holdings) {
-    for (const double damping : asked > 0.0 ? std::vector{asked} : usual_dampings) {
+    for (const double damping : dampings) {
       const SampledWall wall = wall_of(holding, damping);
       const double linear = linear_stiffness(wall, stiffest);
       for (const std::string& method : names) {

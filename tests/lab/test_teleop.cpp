@@ -162,7 +162,7 @@ TEST(Teleop, OneOfItsCouplingsCanBePlayedAlone) {
   ExperimentOptions options;
   options.methods = {"wave"};  // no method of the lab
   EXPECT_EQ(methods_of(find_experiment("teleop"), options), options.methods);
-  EXPECT_TRUE(test::fails_saying([&] { methods_of(find_experiment("lifts"), options); }, "wave"));
+  EXPECT_TRUE(test::fails_saying([&] { methods_of(find_experiment("lift"), options); }, "wave"));
 }
 
 }  // namespace test_teleop

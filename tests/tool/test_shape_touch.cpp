@@ -487,6 +487,23 @@ TEST(ShapeTouch, IsStoppedByTheSideOfABodyOfWhichTheEdgeAloneIsSeen) {
   EXPECT_NEAR(tick.force.z(), 0.0, 0.5);
 }
 
+TEST(ShapeTouch, TouchesNothingJustAboveASurfaceThatItTouched) {
+  Stage stage(plane());
+  Parameters parameters;
+  parameters.coupling.damping = 5.0;
+  stage.touch().set_parameters(parameters);
+  stage.press(pose({0, 0, -2.5e-3}));
+  const double begin = stage.now();
+  const auto above = [&](double t) {
+    return pose({0.1 * (t - begin), 0, std::min(2.8e-3, -2.5e-3 + 0.1 * (t - begin))});
+  };
+  stage.run(0.08, above);
+  stage.run(0.1, above, [](const Tick& tick) {
+    EXPECT_EQ(tick.force.norm(), 0.0) << tick.t;
+    EXPECT_EQ(tick.state, ContactState::free_motion) << tick.t;
+  });
+}
+
 // Hazard: tool-pushes
 TEST(ShapeTouch, IsPushedAsideByABoxThatSlidesIn) {
   for (const char* sensor : {"ideal", "d4xx"}) {

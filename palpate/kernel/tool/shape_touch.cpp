@@ -464,7 +464,7 @@ bool ShapeTouch::move(const Pose& hand) noexcept {
   }
   // On its way to a hand that nothing holds it from any more, it still pulls: no force ends at
   // once.
-  return held_.count > 0 || touching_;
+  return held_.count > 0 || (touching_ && way_to(hand) > at_rest);
 }
 
 // Hazard: tool-pushes

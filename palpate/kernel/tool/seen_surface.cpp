@@ -148,6 +148,13 @@ Vec3 SeenSurface::in_camera(const Vec3& place) const noexcept {
   return pose_.linear().transpose() * (place - pose_.translation());
 }
 
+Eigen::Vector2d SeenSurface::cell_of(const Vec3& p) const noexcept {
+  const Intrinsics& k = image_->intrinsics();
+  const double middle = 0.5 * (stride_ - 1);  // of a cell, behind its first pixel
+  return {(k.cx + shift_u_ + k.fx * p.x() / p.z() - middle) / stride_,
+          (k.cy + shift_v_ + k.fy * p.y() / p.z() - middle) / stride_};
+}
+
 double SeenSurface::level(double t) const noexcept {
   return level_ + moved_since(velocity_, t - stamp_, interval_);  // (6)
 }
@@ -311,8 +318,7 @@ bool SeenSurface::flies(int u, int v, float z, const SightParameters& parameters
   };
   if (!(above(u, v, z) > flying_spreads * spread_)) return false;  // nearly always
   const auto is_hidden = [&](int at_u, int at_v) {
-    return at_u >= u_ && at_v >= v_ && at_u < u_ + side && at_v < v_ + side &&
-           above(at_u, at_v, read(at_u, at_v)) > strike(parameters);
+    return has(at_u, at_v) && above(at_u, at_v, read(at_u, at_v)) > strike(parameters);
   };
   return is_hidden(u - 1, v) || is_hidden(u + 1, v) || is_hidden(u, v - 1) || is_hidden(u, v + 1);
 }
@@ -337,8 +343,7 @@ void SeenSurface::slide() noexcept {
   Cells& all = cells_[0];
   const float high = static_cast<float>(deepest) + sliding_spreads * spread_;
   const auto is_high = [&](int u, int v) {
-    return u >= u_ && v >= v_ && u < u_ + side && v < v_ + side &&
-           all.smooth[index(u, v)] - all.slides[index(u, v)] > high;
+    return has(u, v) && all.smooth[index(u, v)] - all.slides[index(u, v)] > high;
   };
   int size = 0;
   for (std::size_t i = 0; i < count; ++i) size += all.smooth[i] - all.slides[i] > high ? 1 : 0;
@@ -366,6 +371,7 @@ void SeenSurface::slide() noexcept {
 // Takes further rows of the newest frame in: all at once would be felt as a late tick.
 void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcept {
   if (rows_read_ == side) return;
+  const float nearer = strike(parameters);
   for (; rows > 0 && rows_read_ < side; --rows, ++rows_read_) {
     const int v = v_ + ((rows_read_ - v_) & (side - 1));  // each row of the memory once
     for (int u = u_; u < u_ + side; ++u) {
@@ -373,9 +379,8 @@ void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcep
       const std::size_t i = index(u, v);
       const bool flying = flies(u, v, z, parameters);
       const float above = z > 0.0F ? newest_ + cells_[0].smooth[i] - z : 0.0F;
-      if (above > far_strikes * strike(parameters)) ++struck_;
-      if (above > edge_spreads * spread_ && above < strike(parameters) && !flying &&
-          is_of_body(u, v, z)) {
+      if (above > far_strikes * nearer) ++struck_;
+      if (above > edge_spreads * spread_ && above < nearer && !flying && is_of_body(u, v, z)) {
         cells_[0].slides[i] = z - newest_;
         slides_ = true;
       }
@@ -400,7 +405,7 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
   interval_ = interval;
   if (!goes_on) {
     frames_ = 0;
-    slides_ = whole_ = slid_ = false;
+    slides_ = false;
     newest_ = static_cast<float>(in_camera(aim.place).z());
     spread_ = 0.0F;
     const double usual =
@@ -503,12 +508,11 @@ Vec3 SeenSurface::velocity(double t) const noexcept {
 std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& outward,
                                                  double side_depth) const noexcept {
   const Cells& all = cells_[0];
-  const Intrinsics& k = image_->intrinsics();
   const Vec3 p = in_camera(place);
   if (!(p.z() > nearest_camera)) return std::nullopt;
-  const double middle = 0.5 * (stride_ - 1);
-  const double x = (k.cx + shift_u_ + k.fx * p.x() / p.z() - middle) / stride_ - u_;
-  const double y = (k.cy + shift_v_ + k.fy * p.y() / p.z() - middle) / stride_ - v_;
+  const Eigen::Vector2d cell = cell_of(p);
+  const double x = cell.x() - u_;
+  const double y = cell.y() - v_;
   if (!(x >= 0.0 && y >= 0.0 && x < side - 1 && y < side - 1)) return std::nullopt;
   const int u = u_ + static_cast<int>(x);
   const int v = v_ + static_cast<int>(y);
@@ -620,17 +624,14 @@ std::optional<SeenSurface::Fit> SeenSurface::side_near(const Middle& middle,
 template <typename Ends>
 double SeenSurface::walk(const Vec3& place, const Vec3& way, Ends ends) const noexcept {
   constexpr double none = std::numeric_limits<double>::infinity();
-  const Intrinsics& k = image_->intrinsics();
   const Vec3 p = in_camera(place);
   if (!(p.z() > nearest_camera)) return none;
-  const double middle = 0.5 * (stride_ - 1);
-  const double x = (k.cx + shift_u_ + k.fx * p.x() / p.z() - middle) / stride_ + 0.5;
-  const double y = (k.cy + shift_v_ + k.fy * p.y() / p.z() - middle) / stride_ + 0.5;
+  const Eigen::Vector2d cell = cell_of(p);
   const double pitch = cell_at(p.z());
   for (int i = 0; i < farthest_out; ++i) {
-    const int u = static_cast<int>(std::floor(x + i * way.x()));
-    const int v = static_cast<int>(std::floor(y + i * way.y()));
-    if (u < u_ || v < v_ || u >= u_ + side || v >= v_ + side) return none;
+    const int u = static_cast<int>(std::floor(cell.x() + 0.5 + i * way.x()));
+    const int v = static_cast<int>(std::floor(cell.y() + 0.5 + i * way.y()));
+    if (!has(u, v)) return none;
     if (ends(index(u, v), cells_[0].shown[shown_index(u, v)] - p.z() - i * pitch * way.z()))
       return (i + 0.5) * pitch * way.norm();
   }

@@ -163,6 +163,12 @@ class SeenSurface {
   void read_rows(int rows, const SightParameters& parameters) noexcept;
   void slide() noexcept;
   [[nodiscard]] Vec3 in_camera(const Vec3& place) const noexcept;
+  /// [cells] where a place, in the camera's axes and before it, is in the image.
+  [[nodiscard]] Eigen::Vector2d cell_of(const Vec3& p) const noexcept;
+  /// Is a cell in the window?
+  [[nodiscard]] bool has(int u, int v) const noexcept {
+    return u >= u_ && v >= v_ && u < u_ + side && v < v_ + side;
+  }
   /// [m] from cell to cell, z [m] before the camera.
   [[nodiscard]] double cell_at(double z) const noexcept {
     return z * stride_ / image_->intrinsics().fx;

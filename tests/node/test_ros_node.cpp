@@ -24,6 +24,7 @@
 #include "tests/drivers/dds_test.hpp"
 #include "tests/drivers/ros_client.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/patient.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
@@ -144,6 +145,7 @@ TEST_F(RosNodeTest, PublishesHowAToolIsTurnedAndItsTorque) {
   options.cameras.push_back({.uri = "synthetic:plane?size=320x240"});
   options.tool = "box:40x20x5mm?points=500";
   options.open_devices[0] = std::make_unique<TiltedHand>();
+  options.safety = test::patient();
   begin(std::move(options));
   open();
   // The plane pushes the edge at -y, which is the lower one.

@@ -23,6 +23,7 @@
 #include "tests/session/fakes.hpp"
 #include "tests/support/comes_true.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/patient.hpp"
 
 namespace palpate {
 namespace test_session_live {
@@ -198,10 +199,7 @@ SessionOptions patient(const std::shared_ptr<Log>& log) {
   SessionOptions options;
   options.open_cameras.push_back(std::make_unique<LivingCamera>(log));
   options.open_devices[0] = std::make_unique<LoggingDevice>(log);
-  options.safety.fade_age = 5.0;
-  options.safety.lost_age = 10.0;
-  options.safety.late_intervals = 100.0;
-  options.safety.stall_time = 0.1;
+  options.safety = test::patient();
   return options;
 }
 

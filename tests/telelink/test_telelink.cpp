@@ -24,6 +24,7 @@
 #include "tests/drivers/dds_test.hpp"
 #include "tests/support/comes_true.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/patient.hpp"
 
 namespace palpate {
 namespace test_telelink {
@@ -102,6 +103,7 @@ class Telelink : public ::testing::Test {
         std::make_unique<RobotEnd>(std::move(robot), RobotEndOptions{.name = "arm", .tool = tool});
     SessionOptions options;
     options.cameras.push_back({.uri = scene});
+    options.safety = test::patient();
     robot_end_->prepare(options);
     options.on_frame = [this](std::size_t camera, const FedFrame& frame) {
       robot_end_->on_frame(camera, frame);
@@ -118,6 +120,7 @@ class Telelink : public ::testing::Test {
     options.open_devices[0] =
         std::make_unique<ScriptedDevice>(HipPath({{0.0, hand, handle}}), false);
     options.tool = tool;
+    options.safety = test::patient();
     operator_ = std::make_unique<Session>(std::move(options));
     operator_end_ = std::make_unique<OperatorEnd>(
         *operator_, OperatorEndOptions{.name = "arm", .index = index, .learn = true});
@@ -175,7 +178,7 @@ TEST_F(Telelink, LeadsTheRobotToTheHandAndNotThroughWhatIsSeen) {
   push_back(2.0);
   pass(300);
   push_back(0.0);
-  EXPECT_TRUE(comes_true([&] { return operator_end_->robot().touched.has_value(); }));
+  ASSERT_TRUE(comes_true([&] { return operator_end_->robot().touched.has_value(); }));
   const RobotView view = operator_end_->robot();
   EXPECT_NEAR(view.touched->place.x(), 0.05, 5e-3);
   EXPECT_EQ(view.touched->stiffness, Touched::hardest);

@@ -205,6 +205,7 @@ void SeenSurface::start_cell(int u, int v) noexcept {
   all.relief[i] = z > 0.0F ? z - newest_ : unknown;
   all.smooth[i] = all.relief[i];
   all.slides[i] = unknown;
+  all.slid[i] = std::numeric_limits<double>::quiet_NaN();
   all.drift[i] = 0.0F;
   all.frames[i] = z > 0.0F ? 1.0F : 0.0F;
   all.seen[i] = stamp_;
@@ -364,7 +365,7 @@ void SeenSurface::slide() noexcept {
     all.slides[i] = unknown;
     all.drift[i] = 0.0F;
     all.frames[i] = 1.0F;
-    all.seen[i] = stamp_;
+    all.seen[i] = all.slid[i] = stamp_;
   }
 }
 
@@ -645,6 +646,21 @@ double SeenSurface::way_out(const Vec3& place, const Vec3& way) const noexcept {
 
 double SeenSurface::way_back(const Vec3& place, const Vec3& way) const noexcept {
   return walk(place, -way, [](std::size_t /*cell*/, double gap) { return gap < -0.5 * deepest; });
+}
+
+double SeenSurface::speed_along(const Vec3& side, const Vec3& way) const noexcept {
+  const std::array<double, count>& slid = cells_[0].slid;
+  // [s] before which a body slid over a cell; and where the walk ended
+  double latest = stamp_ + interval_, ended = 0.0;
+  const auto far = [&] {
+    return walk(side, -way, [&](std::size_t i, double) { return (ended = slid[i]) < latest; });
+  };
+  const double front = far();
+  for (const double frames : {1.5, 0.5}) {
+    latest = stamp_ - frames * interval_;
+    if (const double older = far(); std::isfinite(older)) return (older - front) / (stamp_ - ended);
+  }
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 // The plane through the cells on a lattice, `step` apart, of so many on either side of the middle.

@@ -74,6 +74,10 @@ class SeenSurface {
   /// [m] from a place in a body to where it is beside it (12); infinite: that is too far away.
   /// @param way  [-] in the camera's axes, of unit length along its image
   [[nodiscard]] double way_out(const Vec3& place, const Vec3& way) const noexcept;
+  /// [m/s] of a body's side along a way, by what it slid over in the last frames (13); NaN: they
+  /// show it for the first time.
+  /// @param side  [m] where the body ends
+  [[nodiscard]] double speed_along(const Vec3& side, const Vec3& way) const noexcept;
   /// [m] from a place beside a body back to it.
   [[nodiscard]] double way_back(const Vec3& place, const Vec3& way) const noexcept;
   /// [m] from cell to cell at a place before the camera.
@@ -110,6 +114,7 @@ class SeenSurface {
     std::array<float, count> smooth;  // [m] the relief as it is shown
     std::array<float, count> slides;  // [m] the relief of a body that slides over it; NaN: none
     std::array<double, count> seen;   // [s] stamp of the newest frame that showed it
+    std::array<double, count> slid;   // [s] stamp of the frame that slid a body over it; NaN: none
     std::array<float, count> ray_x;   // [-] of the ray through its middle
     std::array<float, count> ray_y;
   };

@@ -89,14 +89,16 @@ void SlidingSide::follow(const SeenSurface& seen,
   if (found > 0) move_to(seen, true);
 }
 
-// (13): the side goes on as fast as it did between the last frames.
+// (13): the side goes on as fast as the body slid over cells behind it.
 void SlidingSide::move_to(const SeenSurface& seen, bool is_known) noexcept {
-  const auto front = std::max_element(held_.begin(), held_.begin() + size_,
-                                      [](const Held& a, const Held& b) { return a.out < b.out; });
-  const Vec3 place = front->of.place + front->far * normal_;
-  const double passed = std::max(seen.stamp() - stamp_, 0.5 * seen.interval());
-  if (is_known) speed_ += newest_weight * (normal_.dot(place - front_) / passed - speed_);
-  front_ = place;
+  double sum = 0.0, of = 0.0;
+  for (const Held& held : std::span(held_.data(), size_)) {
+    const double speed = seen.speed_along(held.of.place + held.far * normal_, way_);
+    if (!(speed >= 0.0)) continue;
+    sum += speed;
+    of += 1.0;
+  }
+  if (of > 0.0) speed_ += (is_known ? newest_weight : 1.0) * (sum / of - speed_);
   stamp_ = seen.stamp();
   interval_ = seen.interval();
   if (is_known && speed_ < slowest) size_ = 0;

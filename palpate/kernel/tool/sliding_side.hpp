@@ -59,7 +59,6 @@ class SlidingSide {
   std::size_t camera_ = 0;
   Vec3 way_ = Vec3::Zero();     // [-] along the image, in the camera's axes
   Vec3 normal_ = Vec3::Zero();  // the same in the world, of unit length
-  Vec3 front_ = Vec3::Zero();   // [m] world: where the body is farthest
   double speed_ = 0.0;          // [m/s] along the normal
   double stamp_ = -std::numeric_limits<double>::infinity();  // [s] of the frame
   double interval_ = 0.0;                                    // [s]

@@ -64,7 +64,7 @@ class SimulatedRobot final : public Robot {
   }
   [[nodiscard]] const RobotInfo& info() const override { return info_; }
   void command(const HandPose& pose, const Vec3& velocity, double /*t*/) noexcept override {
-    simulation_->command(pose.position, velocity);
+    simulation_->command(pose, velocity);
   }
   [[nodiscard]] std::optional<RobotState> state() override { return simulation_->state(); }
 

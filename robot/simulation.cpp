@@ -13,6 +13,7 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/servo/realtime.hpp"
@@ -34,7 +35,10 @@ constexpr double max_acceleration = 20.0;          // [m/s^2] of the reference
 // The spring between tip and reference: stiffer, the loop of 1 kHz rings against a stiff contact.
 constexpr double stiffness = 1500.0;       // [N/m]
 constexpr double hold_stiffness = 300.0;   // [N/m] without commands: can be pushed aside
-constexpr double turn_stiffness = 60.0;    // [N m/rad] keeps the tool upright
+constexpr double turn_stiffness = 60.0;    // [N m/rad]
+constexpr double longest_turn = 0.05;      // [rad] that the reference leads the tool by at most
+constexpr double max_spin = 2.0;           // [rad/s] of the reference
+constexpr double max_turning = 20.0;       // [rad/s^2] of it
 constexpr double turn_damping = 3.0;       // [N m s/rad] critical for the hand's 0.03 kg m^2
 constexpr double singular_damping = 0.01;  // [1/kg] bounds the tip's apparent mass by 100 kg
 constexpr double touching = 0.5;           // [N] from here on accelerations are not fed forward
@@ -233,6 +237,7 @@ class Simulation::Implementation {
       throw Error("robot's model: numeric 'reach'", "a least number is above its largest",
                   "give least x, y, z and then largest x, y, z");
     info_.kind = "simulated arm";
+    info_.turns = true;
     info_.reach = reach_;
     info_.max_speed = setup_.max_speed;
     info_.lag = 0.0;  // with the velocity fed forward
@@ -273,11 +278,10 @@ class Simulation::Implementation {
     data_->qvel[plate_dof_] = plate_at(0.0).velocity;
     plate_height_ = plate_at(0.0).height;
     mj_forward(model_.get(), data_.get());
-    upright_ = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-        data_->site_xmat + 9 * static_cast<std::ptrdiff_t>(tip_site_));
     reference_ = tip();
     goal_ = reference_;
-    last_tip_ = reference_;
+    goal_turn_ = reference_turn_ = tip_turn();
+    last_tip_ = {reference_, goal_turn_};
     state_.joints.resize(arm_joints);
     state_.links.resize(chain_.size() + 2);
     tell(0.0);
@@ -320,6 +324,11 @@ class Simulation::Implementation {
     return vector(data_->site_xpos + 3 * static_cast<std::ptrdiff_t>(tip_site_));
   }
 
+  [[nodiscard]] Rotation tip_turn() const {
+    return Rotation(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+        data_->site_xmat + 9 * static_cast<std::ptrdiff_t>(tip_site_)));
+  }
+
   // The arm's torques.
   void lead() {
     const mjModel& m = *model_;
@@ -339,12 +348,14 @@ class Simulation::Implementation {
     const Vector6 velocity = jacobian * Eigen::Map<const Vector6>(d.qvel);
     const Vec3 tip_velocity = velocity.head<3>();
     const Vec3 tip_position = tip();
+    const Rotation tip_turn = this->tip_turn();
 
     const bool led = commanded_ && d.time - commanded_at_ < command_timeout;
     if (led != led_ && !led) {
       // Where the reference comes to rest from its velocity without overshoot.
       goal_ = tip_position + limited(tip_velocity, setup_.max_speed) / reference_rate;
       goal_velocity_.setZero();
+      goal_turn_ = tip_turn;
     }
     led_ = led;
     const double spring = led ? stiffness : hold_stiffness;
@@ -357,7 +368,7 @@ class Simulation::Implementation {
                 max_acceleration);
     reference_velocity_ = limited(old_velocity + acceleration * dt, setup_.max_speed);
     reference_ += reference_velocity_ * dt;
-    Vec3 feed_forward = (reference_velocity_ - old_velocity) / dt;
+    Vec3 advance = (reference_velocity_ - old_velocity) / dt;
     Vec3 lead = reference_ - tip_position;
     if (lead.norm() > longest_lead) {
       const Vec3 away = lead.normalized();
@@ -365,20 +376,31 @@ class Simulation::Implementation {
       reference_ = tip_position + lead;
       const double gaining = (reference_velocity_ - tip_velocity).dot(away);
       if (gaining > 0.0) reference_velocity_ -= gaining * away;
-      feed_forward.setZero();
+      advance.setZero();
     }
-    if (tip_force_.norm() > touching) feed_forward.setZero();
 
     const double mean_mass = apparent_mass.topLeftCorner<3, 3>().trace() / 3.0;
     const double damping = 2.0 * std::sqrt(spring * mean_mass);
-    const Eigen::Matrix3d turn = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-        d.site_xmat + 9 * static_cast<std::ptrdiff_t>(tip_site_));
-    Vec3 tilt = Vec3::Zero();
-    for (int i = 0; i < 3; ++i) tilt += 0.5 * turn.col(i).cross(upright_.col(i));
-    Vector6 wrench = apparent_mass.leftCols<3>() * feed_forward;
+    const Vec3 old_spin = reference_spin_;
+    const Vec3 left = rotation_vector(between(goal_turn_, reference_turn_));
+    const Vec3 turning =
+        limited(reference_rate * (reference_rate * left - 2.0 * old_spin), max_turning);
+    reference_spin_ = limited(old_spin + turning * dt, max_spin);
+    reference_turn_ = unit(product(rotation_by(reference_spin_ * dt), reference_turn_));
+    Vec3 turn = rotation_vector(between(reference_turn_, tip_turn));
+    if (turn.norm() > longest_turn) {
+      turn = limited(turn, longest_turn);
+      reference_turn_ = unit(product(rotation_by(turn), tip_turn));
+      reference_spin_ = velocity.tail<3>();
+    }
+    Vector6 feed_forward;
+    feed_forward << advance, (reference_spin_ - old_spin) / dt;
+    if (tip_force_.norm() > touching) feed_forward.setZero();
+    Vector6 wrench = apparent_mass * feed_forward;
     wrench.head<3>() +=
         limited(spring * lead + damping * (reference_velocity_ - tip_velocity), setup_.max_force);
-    wrench.tail<3>() += turn_stiffness * tilt - turn_damping * velocity.tail<3>();
+    wrench.tail<3>() +=
+        turn_stiffness * turn + turn_damping * (reference_spin_ - velocity.tail<3>());
 
     const Vector6 torque = jacobian.transpose() * wrench + Eigen::Map<const Vector6>(d.qfrc_bias) -
                            Eigen::Map<const Vector6>(d.qfrc_passive);
@@ -389,7 +411,7 @@ class Simulation::Implementation {
       d.ctrl[i] = std::clamp(torque[i], -most, most);
     }
     tip_velocity_ = tip_velocity;
-    last_tip_ = tip_position;
+    last_tip_ = {tip_position, tip_turn};
   }
 
   struct PlateState {
@@ -435,7 +457,8 @@ class Simulation::Implementation {
     filtered_force_ += std::min(1.0, force_filter * dt) * (tip_force_ - filtered_force_);
     told_at_ = kept_count_ == 0 ? 0.0 : newest().t;
     state_.t = origin_ + told_at_;
-    state_.position = kept_count_ == 0 ? tip() : last_tip_;
+    state_.position = last_tip_.position;
+    state_.orientation = last_tip_.orientation;
     state_.velocity = tip_velocity_;
     state_.force = filtered_force_;
     std::copy_n(d.qpos, arm_joints, state_.joints.begin());
@@ -492,10 +515,11 @@ class Simulation::Implementation {
   void take_command() {
     const Command* const command = commands_.take();
     if (command == nullptr) return;
-    goal_ = command->position.cwiseMax(reach_.min()).cwiseMin(reach_.max());
+    goal_ = command->pose.position.cwiseMax(reach_.min()).cwiseMin(reach_.max());
+    goal_turn_ = command->pose.orientation;
     goal_velocity_ = limited(command->velocity, setup_.max_speed);
     for (int i = 0; i < 3; ++i) {
-      if (goal_[i] != command->position[i]) goal_velocity_[i] = 0.0;
+      if (goal_[i] != command->pose.position[i]) goal_velocity_[i] = 0.0;
     }
     commanded_ = true;
     commanded_at_ = data_->time;
@@ -527,7 +551,8 @@ class Simulation::Implementation {
   double plate_mass_ = 0.0, plate_since_ = 0.0;
 
   struct Command {
-    Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
+    HandPose pose;
+    Vec3 velocity = Vec3::Zero();
   };
   Mailbox<Command> commands_;  // so that whoever leads the arm never waits for a step
 
@@ -536,13 +561,16 @@ class Simulation::Implementation {
   std::uint64_t steps_ = 0;
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> jacobian_position_, jacobian_rotation_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> full_mass_;
-  Eigen::Matrix3d upright_ = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d tip_mobility_ = Eigen::Matrix3d::Identity();  // [1/kg]
   Vec3 goal_ = Vec3::Zero(), goal_velocity_ = Vec3::Zero();
   Vec3 reference_ = Vec3::Zero(), reference_velocity_ = Vec3::Zero();
+  Rotation goal_turn_ = Rotation::Identity();
+  Rotation reference_turn_ = Rotation::Identity();
+  Vec3 reference_spin_ = Vec3::Zero();
   bool commanded_ = false, led_ = false;
   double commanded_at_ = 0.0;
-  Vec3 last_tip_ = Vec3::Zero(), tip_velocity_ = Vec3::Zero();
+  HandPose last_tip_;
+  Vec3 tip_velocity_ = Vec3::Zero();
   Vec3 tip_force_ = Vec3::Zero(), filtered_force_ = Vec3::Zero();
   double penetration_ = 0.0, told_at_ = 0.0, max_torque_share_ = 0.0;
   double plate_height_ = 0.0;
@@ -589,9 +617,9 @@ double Simulation::step_length() const { return implementation_->model_->opt.tim
 
 const RobotInfo& Simulation::info() const { return implementation_->info_; }
 
-void Simulation::command(const Vec3& position, const Vec3& velocity) noexcept {
-  if (position.allFinite() && velocity.allFinite())
-    implementation_->commands_.put({position, velocity});
+void Simulation::command(const HandPose& pose, const Vec3& velocity) noexcept {
+  if (pose.position.allFinite() && velocity.allFinite() && is_rotation(pose.orientation))
+    implementation_->commands_.put({{pose.position, unit(pose.orientation)}, velocity});
 }
 
 RobotState Simulation::state() const {

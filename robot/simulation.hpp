@@ -71,8 +71,8 @@ struct Truth {
 ///
 /// The arm is led by an impedance: its tip is drawn to a reference that follows the commands as a
 /// critically damped second-order system does, limited in speed, and that never leads the tip by
-/// more than what makes `max_force`. 100 ms after the last command the tip stops, and is held by a
-/// soft spring.
+/// more than what makes `max_force`. Its orientation follows as that of a SimulatedTurn. 100 ms
+/// after the last command the tip stops, and is held by a soft spring.
 class Simulation {
  public:
   static constexpr double command_timeout = 0.1;  ///< [s]
@@ -96,9 +96,9 @@ class Simulation {
   [[nodiscard]] double step_length() const;  ///< [s]
 
   [[nodiscard]] const RobotInfo& info() const;
-  /// Where the tip is to be from the next step on; without effect unless finite. One thread at a
-  /// time; wait-free.
-  void command(const Vec3& position, const Vec3& velocity) noexcept;
+  /// The tip's pose from the next step on; without effect unless it is one. One thread at a time;
+  /// wait-free.
+  void command(const HandPose& pose, const Vec3& velocity) noexcept;
   [[nodiscard]] RobotState state() const;
 
   [[nodiscard]] Truth truth() const;

@@ -147,7 +147,7 @@ class Task {
     led_.kept_out(guarded.place - guarded.tick.proxy);
     const SetPoint::Order order =
         set_point_.next(guarded, lead_.press, led_.is_led() && !lost, watch_.newest(), state.force);
-    simulation().command(order.position, order.velocity);
+    simulation().command({order.position, order.orientation}, order.velocity);
   }
 
   SimulatedCell cell_;

@@ -26,7 +26,7 @@ SimulatedCell stepped(const std::string& options) {
 TEST(SimulatedCamera, MeasuresWhatMuJoCosRaysMeet) {
   const SimulatedCell cell = stepped("&arm=seen&quantisation=0.05mm");
   const auto camera = cell.camera();
-  cell.simulation()->command({0.05, 0.08, 0.05}, Vec3::Zero());
+  cell.simulation()->command({Vec3(0.05, 0.08, 0.05)}, Vec3::Zero());
   ASSERT_EQ(camera->skip(15), 15u);
   const Frame frame = *camera->next();
   EXPECT_NEAR(frame.stamp, 0.5, 1e-9);

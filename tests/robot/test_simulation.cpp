@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 #include "robot/models.hpp"
 #include "robot/simulation.hpp"
@@ -27,7 +28,7 @@ void lead(Simulation& simulation, double seconds, const std::function<Vec3(doubl
   const auto steps = static_cast<int>(std::round(seconds * 1e3));
   for (int i = 0; i < steps; ++i) {
     const double t = i * 1e-3;
-    if (i % 2 == 0) simulation.command(at(t), (at(t + 1e-6) - at(t - 1e-6)) / 2e-6);
+    if (i % 2 == 0) simulation.command({at(t)}, (at(t + 1e-6) - at(t - 1e-6)) / 2e-6);
     simulation.advance(begin + t + 1e-3);
     if (look) look(simulation.truth());
   }
@@ -241,10 +242,51 @@ TEST(Simulation, GivesEqualStatesBitForBit) {
 
 TEST(Simulation, IgnoresACommandThatIsNoPlace) {
   Simulation simulation;
-  simulation.command({std::nan(""), 0.0, 0.1}, Vec3::Zero());
-  simulation.command(home, {0.0, std::numeric_limits<double>::infinity(), 0.0});
+  simulation.command({Vec3(std::nan(""), 0.0, 0.1)}, Vec3::Zero());
+  simulation.command({home}, {0.0, std::numeric_limits<double>::infinity(), 0.0});
+  simulation.command({home, Rotation(std::nan(""), 0.0, 0.0, 0.0)}, Vec3::Zero());
   simulation.advance(0.3);
   EXPECT_EQ(simulation.state().fault, "");
+  EXPECT_LT((simulation.truth().tip - home).norm(), 1e-3);
+}
+
+// [rad] from how the tool is turned to how it was to be.
+double off(const Simulation& simulation, const Rotation& wanted) {
+  return rotation_vector(between(wanted, simulation.state().orientation)).norm();
+}
+
+// Holds the tip at home, turned, for so many seconds. [m] how far the tip moved at most.
+double turn(Simulation& simulation, const Rotation& wanted, double seconds) {
+  double moved = 0.0;
+  const double begin = simulation.truth().t + simulation.step_length();
+  for (double t = 0.0; t < seconds; t += 2e-3) {
+    simulation.command({home, wanted}, Vec3::Zero());
+    simulation.advance(begin + t);
+    moved = std::max(moved, (simulation.truth().tip - home).norm());
+  }
+  return moved;
+}
+
+TEST(Simulation, TurnsItsToolAboutTheTip) {
+  Simulation simulation;
+  ASSERT_TRUE(simulation.info().turns);
+  for (const Vec3& each : {Vec3(0.4, 0.0, 0.0), Vec3(0.0, -0.4, 0.0), Vec3(0.2, 0.3, 1.0)}) {
+    const Rotation wanted = rotation_by(each);
+    EXPECT_LT(turn(simulation, wanted, 1.0), 3e-3) << each.transpose();
+    EXPECT_LT(off(simulation, wanted), 5e-3) << each.transpose();
+  }
+  const Rotation rests = simulation.state().orientation;
+  simulation.advance(simulation.truth().t + 1.0);
+  EXPECT_LT(off(simulation, rests), 5e-3) << "without commands it stays as it is";
+}
+
+TEST(Simulation, IsNotTornByAnOrientationThatItsJointsCannotReach) {
+  Simulation simulation;
+  turn(simulation, rotation_by({2.5, 0.0, 0.0}), 1.0);
+  EXPECT_EQ(simulation.state().fault, "");
+  EXPECT_GT(off(simulation, Rotation::Identity()), 0.5);
+  turn(simulation, Rotation::Identity(), 1.5);
+  EXPECT_LT(off(simulation, Rotation::Identity()), 5e-3);
   EXPECT_LT((simulation.truth().tip - home).norm(), 1e-3);
 }
 

@@ -23,7 +23,8 @@ constexpr double slow_intervals = 4.0;
 constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
 constexpr float flying_spreads = 2.0F;   // [-] that a reading beside an occluder may be nearer
-constexpr float sliding_spreads = 2.0F;  // [-] beside `deepest`, by which a sliding body is nearer
+constexpr int edge = 2;                  // [cells] from an occluder to where readings may be so
+constexpr float sliding_spreads = 3.0F;  // [-] beside `deepest`, by which a sliding body is nearer
 constexpr float edge_spreads = 4.0F;     // [-] by which it is at its foot, in so many cells
 constexpr int foot = 6;
 constexpr int least_slid = 24;  // cells: two along a frame's way, twelve along an edge
@@ -318,10 +319,10 @@ bool SeenSurface::flies(int u, int v, float z, const SightParameters& parameters
     return reading > 0.0F ? newest_ + cells_[0].relief[index(at_u, at_v)] - reading : 0.0F;
   };
   if (!(above(u, v, z) > flying_spreads * spread_)) return false;  // nearly always
-  const auto is_hidden = [&](int at_u, int at_v) {
-    return has(at_u, at_v) && above(at_u, at_v, read(at_u, at_v)) > strike(parameters);
-  };
-  return is_hidden(u - 1, v) || is_hidden(u + 1, v) || is_hidden(u, v - 1) || is_hidden(u, v + 1);
+  for (int y = v - edge; y <= v + edge; ++y)
+    for (int x = u - edge; x <= u + edge; ++x)
+      if (has(x, y) && above(x, y, read(x, y)) > strike(parameters)) return true;
+  return false;
 }
 
 // Is a reading [m], nearer than what was there, of a body, and not of its edge, where readings are

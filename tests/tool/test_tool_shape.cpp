@@ -101,6 +101,24 @@ TEST(ToolShape, IsTurnedWithAllOfIt) {
   EXPECT_EQ(turned.reach(), box->reach());
 }
 
+TEST(ToolShape, IsHeldAsToldByItsSpecification) {
+  // The needle's point, +x, turns down; its blunt end is at the hand.
+  const auto needle = made("cone:60x6mm?z=-30mm&pitch=90deg");
+  Vec3 tip = Vec3::Zero(), end = Vec3(0.0, 0.0, -1.0);
+  for (const auto& point : needle->points()) {
+    if (point.at.z() < tip.z()) tip = point.at;
+    if (point.at.z() > end.z()) end = point.at;
+  }
+  EXPECT_LT((tip - Vec3(0.0, 0.0, -60e-3)).norm(), 1e-9);
+  EXPECT_NEAR(end.z(), 0.0, 1e-9);
+  EXPECT_NEAR(needle->reach(), 60e-3, 1e-9);
+  // Roll, then pitch, then yaw, about the hand's axes: x becomes -z, and -z stays.
+  const auto box = made("box:40x20x5mm?roll=90deg&pitch=90deg&yaw=90deg&x=10mm");
+  Vec3 half = Vec3::Zero();
+  for (const auto& point : box->points()) half = half.cwiseMax(point.at - Vec3(10e-3, 0.0, 0.0));
+  EXPECT_LT((half - Vec3(2.5e-3, 10e-3, 20e-3)).norm(), 1e-9) << half.transpose();
+}
+
 TEST(ToolShape, GivesABallToOtherMethods) { EXPECT_EQ(made("ball"), nullptr); }
 
 TEST(ToolShape, SaysWhatIsWrong) {
@@ -112,6 +130,9 @@ TEST(ToolShape, SaysWhatIsWrong) {
   EXPECT_NE(refusal("box:9x9x9m").find("between"), std::string::npos);
   EXPECT_NE(refusal("mesh:a.stl").find("unit"), std::string::npos);
   EXPECT_NE(refusal("box:40x20x5mm?poinst=3").find("points"), std::string::npos);
+  EXPECT_NE(refusal("box:40x20x5mm?origin=file").find("origin"), std::string::npos);
+  EXPECT_NE(refusal("box:40x20x5mm?pitch=3mm").find("pitch"), std::string::npos);
+  EXPECT_NE(refusal("box:40x20x5mm?x=2m").find("'x'"), std::string::npos);
 }
 
 TEST(LeastMotion, IsTheNearestPointOfAWedge) {

@@ -7,9 +7,11 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <span>
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/mathematics.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/core/uri.hpp"
 
 namespace palpate {
@@ -308,13 +310,10 @@ std::shared_ptr<const ToolShape> make_tool(std::string_view given, const MeshRea
       "points", double{ToolShape::usual_points}, 4.0, double{ToolShape::most_points}, ""));
   const auto lengths = [&](std::size_t n) { return lengths_of(text, uri.path(), n); };
   Triangles surface;
-  if (kind == "mesh") {
-    uri.allow_only(
-        std::array<std::string_view, 5>{"points", "turning", "margin", "unit", "origin"});
-    surface = mesh_of(text, uri, read);
-  } else {
-    uri.allow_only(std::array<std::string_view, 3>{"points", "turning", "margin"});
-  }
+  constexpr std::array<std::string_view, 11> options = {
+      "points", "turning", "margin", "x", "y", "z", "roll", "pitch", "yaw", "unit", "origin"};
+  uri.allow_only(std::span(options).first(kind == "mesh" ? options.size() : options.size() - 2));
+  if (kind == "mesh") surface = mesh_of(text, uri, read);
   if (kind == "box") {
     std::vector<double> sides = lengths(3);
     std::sort(sides.rbegin(), sides.rend());
@@ -337,6 +336,16 @@ std::shared_ptr<const ToolShape> make_tool(std::string_view given, const MeshRea
   } else if (kind != "mesh") {
     refuse(text, "'" + kind + "' is no tool");
   }
+  const auto pose = [&](std::string_view key, double most, std::string_view unit) {
+    return uri.number_option(key, 0.0, -most, most, unit);
+  };
+  const auto angle = [&](std::string_view key, const Vec3& axis) {
+    return rotation_by(pose(key, std::numbers::pi, "rad") * axis);
+  };
+  const Rotation turn = product(angle("yaw", Vec3::UnitZ()), product(angle("pitch", Vec3::UnitY()),
+                                                                     angle("roll", Vec3::UnitX())));
+  const Vec3 at(pose("x", 0.5, "m"), pose("y", 0.5, "m"), pose("z", 0.5, "m"));
+  for (Vec3& p : surface.points) p = turn * p + at;
   return std::make_shared<const ToolShape>(
       surface, count, text, uri.number_option("turning", ToolShape::usual_turning, 0.01, 1e3, ""),
       uri.number_option("margin", 0.0, 0.0, 0.05, "m"));

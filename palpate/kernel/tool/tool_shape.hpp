@@ -86,13 +86,13 @@ using MeshReader = std::function<Triangles(const std::string& file)>;
 ///     capsule:LENGTHxDIAMETERmm along x, the round ends included; cylinder: the same
 ///     cone:LENGTHxDIAMETERmm    along x, the point at +x
 ///     gripper:LENGTHxOPENINGxTHICKNESSmm   two square fingers along x, OPENING apart along y
-///     mesh:FILE?unit=mm         a closed mesh; unit m, cm, mm or in; origin=centre (of its box,
-///     the
-///                               default) or origin=file
+///     mesh:FILE?unit=mm         a closed mesh; unit m, cm, mm or in; origin=centre (of its box),
+///                               the default, or origin=file
 ///
 /// Lengths have one unit behind the last: mm, cm or m. All take the options
 /// points=N, turning=X of 0.01 to 1000 (see ToolShape::turning), and margin=M [m]: it touches with
-/// a surface that lies so far outside of its own.
+/// a surface that lies so far outside of its own; and how the hand holds it: first turned by roll,
+/// pitch and yaw [rad] about x, y and z of the hand, then moved by x, y and z [m].
 /// @throws Error saying what was wrong
 std::shared_ptr<const ToolShape> make_tool(std::string_view text, const MeshReader& read);
 

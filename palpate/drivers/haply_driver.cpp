@@ -9,14 +9,15 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
 
+#include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/use_future.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
@@ -34,6 +35,7 @@ namespace {
 using Json = nlohmann::json;
 namespace asio = boost::asio;
 namespace beast = boost::beast;
+using asio::ip::tcp;
 
 constexpr std::string_view scheme = "haply:";
 constexpr double opening_time = 2.0;     // [s] for each step of opening
@@ -57,25 +59,27 @@ std::chrono::nanoseconds time_of(double seconds) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
 }
 
-// Lets what was begun end. @throws boost::system::system_error
-template <class Result>
-Result finish(asio::io_context& context, std::future<Result> begun) {
+// Lets what `begin` begins with the handler that it is given end. If it fails, the socket must go
+// before the context runs again. @param timeout  [s] @throws boost::system::system_error
+template <class Begin>
+void finish(asio::io_context& context, double timeout, const Begin& begin) {
+  std::optional<beast::error_code> ended;
+  begin([&ended](beast::error_code error, const auto&...) { ended = error; });
   context.restart();
-  context.run();
-  return begun.get();
+  context.run_for(time_of(timeout));
+  if (!ended) ended = beast::error::timeout;
+  if (*ended) throw boost::system::system_error(*ended);
 }
 
-// Connects, and bounds what is done next on the stream. @param timeout  [s] for each of both
-// @throws Error naming the place if there is no such host, or nobody answers
-void connect(asio::io_context& context, beast::tcp_stream& stream, const std::string& host,
-             int port, double timeout) {
+// @param timeout  [s] @throws Error naming the place if there is no such host, or nobody answers
+void connect(asio::io_context& context, tcp::socket& socket, const std::string& host, int port,
+             double timeout) {
   try {
-    asio::ip::tcp::resolver resolver(context);
+    tcp::resolver resolver(context);
     const auto addresses = resolver.resolve(host, std::to_string(port));
-    stream.expires_after(time_of(timeout));
-    finish(context, stream.async_connect(addresses, asio::use_future));
-    stream.socket().set_option(asio::ip::tcp::no_delay(true));
-    stream.expires_after(time_of(timeout));
+    finish(context, timeout,
+           [&](auto done) { asio::async_connect(socket, addresses, std::move(done)); });
+    socket.set_option(tcp::no_delay(true));
   } catch (const boost::system::system_error& error) {
     throw Error(place_of(host, port), "nobody answers (" + error.code().message() + ")");
   }
@@ -85,16 +89,18 @@ void connect(asio::io_context& context, beast::tcp_stream& stream, const std::st
 std::string http_get(const std::string& host, int port, const std::string& target, double timeout) {
   namespace http = beast::http;
   asio::io_context context;
-  beast::tcp_stream stream(context);
-  connect(context, stream, host, port, timeout);
+  tcp::socket socket(context);
+  connect(context, socket, host, port, timeout);
   http::request<http::empty_body> request(http::verb::get, target, 11);
   request.set(http::field::host, place_of(host, port));
   request.set(http::field::accept, "application/json");
   http::response<http::string_body> response;
   try {
     beast::flat_buffer buffer;
-    finish(context, http::async_write(stream, request, asio::use_future));
-    finish(context, http::async_read(stream, buffer, response, asio::use_future));
+    finish(context, timeout,
+           [&](auto done) { http::async_write(socket, request, std::move(done)); });
+    finish(context, timeout,
+           [&](auto done) { http::async_read(socket, buffer, response, std::move(done)); });
   } catch (const boost::system::system_error&) {
     response.result(http::status::unknown);
   }
@@ -115,12 +121,12 @@ class WebSocket {
     constexpr std::size_t largest_message = std::size_t{1} << 20U;  // [byte]
     socket_.read_message_max(largest_message);
     try {
-      finish(context_, socket_.async_handshake(place_, "/", asio::use_future));
+      finish(context_, timeout,
+             [&](auto done) { socket_.async_handshake(place_, "/", std::move(done)); });
     } catch (const boost::system::system_error& error) {
       throw Error(place_,
                   "the server does not answer as a WebSocket (" + error.code().message() + ")");
     }
-    beast::get_lowest_layer(socket_).expires_never();
     context_.restart();
     read();
   }
@@ -172,7 +178,7 @@ class WebSocket {
   std::string place_;  // "localhost:10001"
   double timeout_;     // [s]
   asio::io_context context_;
-  beast::websocket::stream<beast::tcp_stream, false> socket_{context_};  // without compression
+  beast::websocket::stream<tcp::socket, false> socket_{context_};  // without compression
   beast::flat_buffer buffer_;
   std::string newest_;  // that has come and was not asked for yet
   std::string sending_;

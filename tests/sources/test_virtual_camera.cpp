@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "palpate/io/sources/virtual_camera.hpp"
@@ -102,6 +103,15 @@ TEST_F(VirtualCameraTest, TakesScaleAxesAndPoseFromTheUri) {
   EXPECT_LT(outward(*cloud).y(), -0.9);
   EXPECT_GT(plane(*cloud, 1, -1e-3).seen, 1U);
   EXPECT_EQ(camera->next()->stamp, 1.0 / 30.0);
+}
+
+TEST_F(VirtualCameraTest, TurnsAnAxisUpByTheShortestTurnBitForBit) {
+  const Vec3 z = Vec3::UnitZ();
+  for (const char* up : {"x", "y", "z", "-x", "-y", "-z"}) {
+    const Vec3 axis = (*up == '-' ? -1.0 : 1.0) * Vec3::Unit(up[*up == '-' ? 1 : 0] - 'x');
+    const Eigen::Matrix3d expected = Eigen::Quaterniond::FromTwoVectors(axis, z).toRotationMatrix();
+    EXPECT_EQ(body_options(Uri(std::string("map:a.ply?up=") + up)).turn, expected) << up;
+  }
 }
 
 TEST_F(VirtualCameraTest, SaysWhatIsWrongWithAFile) {

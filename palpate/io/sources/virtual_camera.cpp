@@ -264,7 +264,14 @@ BodyOptions body_options(const Uri& uri, bool y_up, bool in_metres) {
                 "give x, y, z, -x, -y or -z");
   const auto number = found - axes.begin();
   const Vec3 axis = (number < 3 ? 1.0 : -1.0) * Vec3::Unit(number % 3);
-  options.turn = Eigen::Quaterniond::FromTwoVectors(axis, Vec3::UnitZ()).toRotationMatrix();
+  // The shortest turn of it onto z. Eigen's FromTwoVectors would instantiate a singular value
+  // decomposition.
+  const Vec3 across = axis.cross(Vec3::UnitZ());
+  const double twice = std::sqrt(2.0 * (1.0 + axis.z()));  // cosine of half the angle
+  options.turn = (twice > 0.0 ? Eigen::Quaterniond(0.5 * twice, across.x() / twice,
+                                                   across.y() / twice, across.z() / twice)
+                              : Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0))  // of -z, round x
+                     .toRotationMatrix();
   if (!uri.has("scale") && !in_metres) options.assumed = "its unit is assumed to be 1 m (?scale=)";
   if (!uri.has("up") && !y_up)
     options.assumed +=

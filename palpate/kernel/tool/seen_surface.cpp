@@ -649,12 +649,12 @@ double SeenSurface::way_back(const Vec3& place, const Vec3& way) const noexcept 
   return walk(place, -way, [](std::size_t /*cell*/, double gap) { return gap < -0.5 * deepest; });
 }
 
-double SeenSurface::speed_along(const Vec3& side, const Vec3& way) const noexcept {
+double SeenSurface::speed_along(const Vec3& from, const Vec3& way) const noexcept {
   const std::array<double, count>& slid = cells_[0].slid;
   // [s] before which a body slid over a cell; and where the walk ended
   double latest = stamp_ + interval_, ended = 0.0;
   const auto far = [&] {
-    return walk(side, -way, [&](std::size_t i, double) { return (ended = slid[i]) < latest; });
+    return walk(from, -way, [&](std::size_t i, double) { return (ended = slid[i]) < latest; });
   };
   const double front = far();
   for (const double frames : {1.5, 0.5}) {

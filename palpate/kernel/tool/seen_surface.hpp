@@ -76,8 +76,8 @@ class SeenSurface {
   [[nodiscard]] double way_out(const Vec3& place, const Vec3& way) const noexcept;
   /// [m/s] of a body's side along a way, by what it slid over in the last frames (13); NaN: they
   /// show it for the first time.
-  /// @param side  [m] where the body ends
-  [[nodiscard]] double speed_along(const Vec3& side, const Vec3& way) const noexcept;
+  /// @param from  [m] where the body ends
+  [[nodiscard]] double speed_along(const Vec3& from, const Vec3& way) const noexcept;
   /// [m] from a place beside a body back to it.
   [[nodiscard]] double way_back(const Vec3& place, const Vec3& way) const noexcept;
   /// [m] from cell to cell at a place before the camera.

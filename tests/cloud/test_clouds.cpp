@@ -17,6 +17,7 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/paper/paper.hpp"
 
+#include "tests/support/errors.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
@@ -586,6 +587,57 @@ TEST(DepthImage, RefusesWhatCannotBeACamera) {
   Eigen::Isometry3d sheared = Eigen::Isometry3d::Identity();
   sheared.linear()(0, 1) = 0.1;
   EXPECT_THROW(DepthImage(rays, std::vector<std::uint16_t>(16), 1000.0, sheared), Error);
+}
+
+TEST(DepthImage, SaysHowNoisyTheReadingIsThatSawAPlace) {
+  Intrinsics k{.width = 40, .height = 30, .fx = 40, .fy = 40, .cx = 19.5, .cy = 14.5};
+  Eigen::Isometry3d pose(Eigen::Translation3d(0.1, -0.2, 0.3));
+  pose.rotate(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()));
+  constexpr double usual = 7.0;  // [m]
+  for (const bool is_distorted : {false, true}) {
+    if (is_distorted) k.distortion = {0.05, -0.02, 1e-3, 1e-3, 0, 0, 0, 0};
+    std::vector<std::uint16_t> depth(1200, 800);
+    depth[45] = 0;
+    DepthImage image(std::make_shared<ViewingRays>(k), depth, 1000.0, pose);
+    EXPECT_FALSE(image.has_noise());
+    EXPECT_EQ(image.noise_at(3, 2, usual), usual);
+    std::vector<float> noise(1200);
+    for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = 0.25F * static_cast<float>(i);
+    image.set_noise(noise);
+    ASSERT_TRUE(image.has_noise());
+    for (int v = 0; v < k.height; ++v) {
+      for (int u = 0; u < k.width; ++u) {
+        const double said = image.noise_at(u, v, usual);
+        const auto place = image.deproject(u, v);
+        // No reading is better than rounding to its unit, and a hole has none.
+        const double truth = std::max(0.25e-3 * (40 * v + u), 1e-3 / std::sqrt(12.0));
+        EXPECT_NEAR(said, place ? truth : usual, 1e-12) << u << ' ' << v;
+        if (place) EXPECT_EQ(image.noise_at(*place, usual), said) << u << ' ' << v;
+      }
+    }
+    EXPECT_EQ(image.noise_at(pose * Vec3(0, 0, -1), usual), usual) << "behind the camera";
+    EXPECT_EQ(image.noise_at(pose * Vec3(1, 0, 1), usual), usual) << "beside the image";
+    DepthImage copy = image;
+    EXPECT_EQ(copy.noise(), image.noise()) << "shared";
+    copy.rescale(2.0);
+    EXPECT_NEAR(copy.noise_at(0, 20, usual), 0.4, 1e-12);
+  }
+}
+
+TEST(DepthImage, RefusesNoiseThatIsNone) {
+  const Intrinsics k{.width = 4, .height = 3, .fx = 60, .fy = 60, .cx = 2, .cy = 2};
+  DepthImage image(std::make_shared<ViewingRays>(k), std::vector<std::uint16_t>(12, 500), 1000.0);
+  for (const float wrong : {std::nanf(""), std::numeric_limits<float>::infinity(), -1e-3F}) {
+    std::vector<float> noise(12, 1.0F);
+    noise[9] = wrong;
+    EXPECT_TRUE(test::fails_saying([&] { return image.set_noise(noise), 0; }, "noise",
+                                   std::to_string(wrong), "row 2, column 1", "give"));
+  }
+  EXPECT_TRUE(test::fails_saying([&] { return image.set_noise(std::vector<float>(11)), 0; },
+                                 "noise", "11", "12", "give"));
+  EXPECT_FALSE(image.has_noise());
+  image.set_noise(std::vector<float>(12, 1e30F));  // all there is room for
+  EXPECT_NEAR(image.noise_at(0, 0, 1.0), 4.096, 1e-3);
 }
 
 TEST(Clouds, AllGiveTheSameProxyToRounding) {

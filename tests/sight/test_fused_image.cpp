@@ -96,6 +96,35 @@ TEST(FusedImage, AveragesEachPixelOfAShapeThatIsNoQuadric) {
   EXPECT_LT(error(fused, valley, Vec3(0, 0, 2e-3)), 1.5 * sigma / std::sqrt(32.0));
 }
 
+TEST(FusedImage, DoesNotTakeTheNoiseOfAPixelThatSaysItIsNoisyForAnotherSurface) {
+  // A half of the valley has a tenth of the noise.
+  std::array<double, 2> errors{};
+  for (const bool is_told : {false, true}) {
+    Camera quiet, noisy;
+    FusedImage fused;
+    double squares = 0.0;
+    std::vector<std::unique_ptr<DepthImage>> images;
+    for (int i = 0; i < 200; ++i) {
+      const DepthImage& left = quiet.shoot(valley, 0.1 * sigma);
+      std::vector<std::uint16_t> depth = left.depth().copy();
+      const DepthImage& right = noisy.shoot(valley);
+      std::vector<float> noise;
+      for (std::size_t k = 0; k < depth.size(); ++k) {
+        if (k % 160 >= 80) depth[k] = right.depth()[k];
+        noise.push_back(static_cast<float>((k % 160 >= 80 ? 1.0 : 0.1) * sigma * 5e4));
+      }
+      images.push_back(std::make_unique<DepthImage>(left.shared_rays(), std::move(depth), 5e4,
+                                                    left.world_from_camera()));
+      if (is_told) images.back()->set_noise(noise);
+      observe(fused, *images.back(), i, Vec3(0, 0, 2e-3));
+      if (i >= 64) squares += std::pow(error(fused, valley, Vec3(8e-3, 0, 8e-3)), 2);
+    }
+    errors[is_told ? 1 : 0] = std::sqrt(squares / 136.0);
+  }
+  EXPECT_LT(errors[1], 1.3 * sigma / std::sqrt(64.0));
+  EXPECT_GT(errors[0], 1.3 * errors[1]);
+}
+
 TEST(FusedImage, MovesAllPixelsWithASurfaceThatRises) {
   constexpr double speed = 0.05;  // [m/s]
   Camera camera;

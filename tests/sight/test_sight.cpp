@@ -308,6 +308,98 @@ TEST(Sight, RestsOnASheetTouchedFromBehind) {
   EXPECT_LT(tick.force.z(), -5.0);
 }
 
+// A flat plane whose readings are ten times as noisy where `is_noisy(u, frame)`, and what the
+// camera says of that.
+struct NoisyPlane {
+  static constexpr double sigma = 0.4e-3;  // [m]
+  std::function<bool(int u, int frame)> is_noisy;
+  bool is_told;
+  double said = 1.0;  // [-] of the noise that there is
+
+  [[nodiscard]] DepthImage shoot(int frame, std::mt19937& random) const {
+    std::normal_distribution<double> normal(0.0, 1.0);
+    std::vector<float> noise;
+    const DepthImage still = camera.shoot([](double, double) { return 0.0; }, 0.0, random);
+    std::vector<std::uint16_t> depth = still.depth().copy();
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+      const double of = (is_noisy(static_cast<int>(i % 160), frame) ? 10.0 : 1.0) * sigma * 5e4;
+      noise.push_back(static_cast<float>(said * of));
+      depth[i] = static_cast<std::uint16_t>(depth[i] + of * normal(random) + 0.5);
+    }
+    DepthImage image(still.shared_rays(), std::move(depth), 5e4, still.world_from_camera());
+    if (is_told) image.set_noise(noise);
+    return image;
+  }
+  // Of a resting hand 6 mm deep [m rms]: how far off the truth the proxy is, and how it leans [-].
+  struct Errors {
+    double height = 0.0, lean = 0.0;
+  };
+  [[nodiscard]] Errors errors(unsigned seeds) const {
+    double squares = 0.0, leans = 0.0, count = 0.0;
+    for (unsigned seed = 1; seed <= seeds; ++seed) {
+      std::mt19937 random(seed);
+      Sight sight = seated({0, 0, 0.03});
+      for (int k = 0; k < 40; ++k) {
+        const DepthImage image = shoot(k, random);
+        const Tick tick = live_through(sight, image, k * interval, [](double t) {
+          return Vec3(0, 0, std::max(0.03 - 0.1 * t, -6e-3));
+        });
+        EXPECT_TRUE(tick.force.allFinite());
+        if (k < 25) continue;
+        squares += std::pow(tick.proxy.z() - r_c, 2);
+        leans += tick.normal.head<2>().squaredNorm();
+        ++count;
+      }
+    }
+    return {std::sqrt(squares / count), std::sqrt(leans / count)};
+  }
+  Overhead camera{};
+};
+
+TEST(Sight, LeansOnTheHalfOfAnImageThatSaysItIsQuiet) {
+  const auto half = [](int u, int /*frame*/) { return u >= 80; };
+  const NoisyPlane::Errors untold = NoisyPlane{half, false}.errors(10);
+  const NoisyPlane::Errors told = NoisyPlane{half, true}.errors(10);
+  EXPECT_LT(told.height, 0.5 * untold.height);
+  EXPECT_LT(told.lean, 0.5 * untold.lean);
+}
+
+TEST(Sight, IsMovedLessByFramesThatSayTheyAreNoisy) {
+  const auto now_and_then = [](int /*u*/, int frame) { return frame % 4 == 3; };
+  const NoisyPlane::Errors untold = NoisyPlane{now_and_then, false}.errors(10);
+  const NoisyPlane::Errors told = NoisyPlane{now_and_then, true}.errors(10);
+  EXPECT_LT(told.height, 0.5 * untold.height);
+}
+
+TEST(Sight, IsNotMisledByAnImageThatIsTooSureOfItselfOrNotEnough) {
+  const auto nowhere = [](int /*u*/, int /*frame*/) { return false; };
+  const NoisyPlane::Errors untold = NoisyPlane{nowhere, false}.errors(5);
+  for (const double said : {0.1, 10.0}) {
+    const NoisyPlane::Errors told = NoisyPlane{nowhere, true, said}.errors(5);
+    EXPECT_NEAR(told.height, untold.height, 0.1 * untold.height) << said;
+    EXPECT_NEAR(told.lean, untold.lean, 0.1 * untold.lean) << said;
+  }
+}
+
+TEST(Sight, RestsOnReadingsThatSayTheyAreWithoutNoise) {
+  // All of them, or one in a few, which then decide alone.
+  for (const int each : {1, 9}) {
+    std::mt19937 random(3);
+    Sight sight = seated({0, 0, 0.02});
+    Tick tick{};
+    for (int k = 0; k < 10; ++k) {
+      DepthImage image = Overhead().shoot([](double, double) { return 0.0; }, 0.3e-3, random);
+      std::vector<float> noise(image.depth().size(), 1e4F);
+      for (std::size_t i = 0; i < noise.size(); i += static_cast<std::size_t>(each)) noise[i] = 0;
+      image.set_noise(noise);
+      tick = live_through(sight, image, k * interval, [](double) { return Vec3(0, 0, -6e-3); });
+      ASSERT_TRUE(tick.force.allFinite());
+    }
+    EXPECT_NEAR(tick.proxy.z(), r_c, 0.3e-3) << each;
+    EXPECT_NEAR(tick.force.z(), 600.0 * 6e-3, 0.2) << each;
+  }
+}
+
 struct Lift {
   double acceleration, sigma;  // [m/s^2], [m]
 };

@@ -37,6 +37,11 @@ class Counted final : public Cloud {
     beam_points += most;
     cloud_.gather(beam, most, patch);
   }
+  [[nodiscard]] bool has_noise() const noexcept override { return cloud_.has_noise(); }
+  [[nodiscard]] double noise_at(const Vec3& place, double usual) const noexcept override {
+    return cloud_.noise_at(place, usual);
+  }
+  [[nodiscard]] const DepthImage* image() const noexcept override { return cloud_.image(); }
   mutable int gathers = 0;
   mutable std::size_t beam_points = 0;
 
@@ -98,6 +103,18 @@ std::vector<std::unique_ptr<Cloud>> hostile_clouds() {
   }
   clouds.push_back(std::make_unique<DepthImage>(rays, wild, 1e3, pose));
   clouds.push_back(std::make_unique<DepthImage>(rays, wild, 1e-3, pose));
+  // Noise of any size, and none at all.
+  std::vector<float> noise(wild.begin(), wild.end());
+  for (const double units : {1e3, 1e-3}) {
+    for (const float each : {0.0F, 1e-3F, 1.0F}) {
+      for (float& value : noise) value *= each;
+      auto plane =
+          std::make_unique<DepthImage>(rays, std::vector<std::uint16_t>(64 * 48, 300), units, pose);
+      plane->set_noise(noise);
+      clouds.push_back(std::move(plane));
+      noise.assign(wild.begin(), wild.end());
+    }
+  }
   return clouds;
 }
 

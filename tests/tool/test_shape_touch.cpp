@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -6,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +55,7 @@ class Stage {
               DepthImage(image->shared_rays(), std::vector<std::uint16_t>(image->depth().size()),
                          image->units_per_metre(), image->world_from_camera());
         image->set_materials(materials);
+        if (change) change(*image);
         touch_.observe({*image, frame_.stamp, camera});
         image_ = std::move(image);
       }
@@ -76,6 +79,7 @@ class Stage {
   bool blind = false;      // do they show nothing?
   std::size_t camera = 0;  // its number
   std::shared_ptr<const MaterialMap> materials;
+  std::function<void(DepthImage&)> change;  // what else an image is
 
  private:
   static CameraSetup setup(double distance, double tilt) {
@@ -751,6 +755,53 @@ TEST(ShapeTouch, AllocatesNothing) {
     force += touch.tick(hand(i * 1e-3), stage.now() + i * 1e-3).force.z();
   EXPECT_EQ(calls.count(), 0u);
   EXPECT_GT(force, 0.0);
+}
+
+// Makes readings ten times as noisy in the right half of an image; says so.
+class HalfNoisy {
+ public:
+  explicit HalfNoisy(bool is_told) : is_told_(is_told) {}
+  void operator()(DepthImage& image) {
+    constexpr double sigma = 0.4e-3;  // [m]
+    const int width = image.intrinsics().width;
+    std::vector<std::uint16_t> depth = image.depth().copy();
+    std::vector<float> noise;
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+      const bool is_right = static_cast<int>(i) % width >= width / 2;
+      noise.push_back(
+          static_cast<float>((is_right ? 10.0 : 1.0) * sigma * image.units_per_metre()));
+      depth[i] = static_cast<std::uint16_t>(depth[i] + noise.back() * normal_(random_) + 0.5);
+    }
+    image = DepthImage(image.shared_rays(), std::move(depth), image.units_per_metre(),
+                       image.world_from_camera());
+    if (is_told_) image.set_noise(noise);
+  }
+
+ private:
+  bool is_told_;
+  std::mt19937 random_{7};
+  std::normal_distribution<double> normal_;
+};
+
+TEST(ShapeTouch, LeansOnTheHalfOfAnImageThatSaysItIsQuiet) {
+  std::array<double, 2> off{}, aside{};  // [N^2] of the force: summed over ticks
+  for (const bool is_told : {false, true}) {
+    Stage stage(plane(), "capsule:30x10mm", "ideal", 0.6, 0.0);  // across the border of both
+    stage.change = HalfNoisy(is_told);
+    stage.press(pose({0, 0, 0}));
+    stage.run(
+        2.0,
+        [](double) {
+          return pose({0, 0, 0});
+        },
+        [&](const Tick& tick) {
+          const std::size_t which = is_told ? 1 : 0;
+          off[which] += (tick.force - Vec3(0, 0, stiffness * 5e-3)).squaredNorm();
+          aside[which] += tick.force.head<2>().squaredNorm();
+        });
+  }
+  EXPECT_LT(std::sqrt(off[1]), 0.3 * std::sqrt(off[0])) << off[1] << ' ' << off[0];
+  EXPECT_LT(std::sqrt(aside[1]), 0.3 * std::sqrt(aside[0])) << aside[1] << ' ' << aside[0];
 }
 
 // What is left of a signal above 20 Hz, rms.

@@ -367,6 +367,33 @@ void DepthImage::set_world_from_camera(const Eigen::Isometry3d& world_from_camer
   world_from_camera_ = world_from_camera;
 }
 
+void DepthImage::set_noise(std::span<const float> deviation) {
+  std::vector<std::uint16_t> steps(deviation.size());
+  for (std::size_t i = 0; i < deviation.size(); ++i) {
+    if (!(std::isfinite(deviation[i]) && deviation[i] >= 0.0F)) {
+      const auto width = static_cast<std::size_t>(intrinsics().width);
+      throw Error(
+          "noise",
+          "it is " + std::to_string(deviation[i]) + " at row " + std::to_string(i / width) +
+              ", column " + std::to_string(i % width),
+          "give a standard deviation, 0 or more, for each pixel, also where depth has holes");
+    }
+    constexpr float most = 65535.0F;
+    steps[i] = static_cast<std::uint16_t>(
+        std::lround(std::min(static_cast<float>(noise_steps) * deviation[i], most)));
+  }
+  set_noise(std::make_shared<const std::vector<std::uint16_t>>(std::move(steps)));
+}
+
+void DepthImage::set_noise(Noise noise) {
+  if (noise && noise->size() != depth_.size())
+    throw Error(
+        "noise",
+        std::to_string(noise->size()) + " values for " + std::to_string(depth_.size()) + " pixels",
+        "give one for each pixel, or none");
+  noise_ = std::move(noise);
+}
+
 void DepthImage::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {
   patch.start_view(Vec3(world_from_camera_.translation()));
   gather(ball, nullptr, max_points, patch);
@@ -491,6 +518,19 @@ double DepthImage::spacing(const Vec3& place) const noexcept {
   const bool inside =
       p.z() > 0.0 && u > -0.5 && v > -0.5 && u < camera.width - 0.5 && v < camera.height - 0.5;
   return inside ? p.z() / std::min(camera.fx, camera.fy) : 0.0;
+}
+
+double DepthImage::noise_at(const Vec3& place, double usual) const noexcept {
+  const Intrinsics& k = intrinsics();
+  const Vec3 p =
+      world_from_camera_.linear().transpose() * (place - world_from_camera_.translation());
+  if (!(noise_ && p.z() > 0.0)) return usual;
+  Eigen::Vector2d ray(p.x() / p.z(), p.y() / p.z());
+  if (k.distorted()) ray = distort(k.distortion, ray);
+  const double u = std::floor(k.fx * ray.x() + k.cx + 0.5);
+  const double v = std::floor(k.fy * ray.y() + k.cy + 0.5);
+  if (!(u >= 0.0 && v >= 0.0 && u < k.width && v < k.height)) return usual;
+  return noise_at(static_cast<int>(u), static_cast<int>(v), usual);
 }
 
 void DepthImage::sample(const Vec3& place, const Vec3& normal, double radius,

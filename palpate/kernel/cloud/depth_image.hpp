@@ -135,6 +135,8 @@ class DepthImage final : public Cloud {
                  Patch& patch) const noexcept override;
   /// Depth of `place` by the focal length; 0 outside the image (a lens's distortion not counted).
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
+  [[nodiscard]] bool has_noise() const noexcept override { return noise_ != nullptr; }
+  [[nodiscard]] double noise_at(const Vec3& place, double usual) const noexcept override;
   [[nodiscard]] bool has_materials() const noexcept override { return materials_ != nullptr; }
   [[nodiscard]] bool has_brightness() const noexcept override {
     return !brightness_.empty() || (materials_ && materials_->has_brightness());
@@ -150,6 +152,19 @@ class DepthImage final : public Cloud {
   void set_materials(std::shared_ptr<const MaterialMap> materials) noexcept {
     materials_ = std::move(materials);
   }
+
+  /// The noise of each pixel in steps of 1 / noise_steps of a depth unit, row by row; null: it is
+  /// not known. Copies of the image share it.
+  using Noise = std::shared_ptr<const std::vector<std::uint16_t>>;
+  static constexpr double noise_steps = 16.0;  ///< [-] in a unit of depth
+  [[nodiscard]] const Noise& noise() const noexcept { return noise_; }
+  /// Says how noisy each pixel's reading is. Before the image is shared.
+  /// @param deviation  standard deviation along the optical axis, row by row, in the depth's own
+  ///                   unit; rounded to noise_steps, and 65535 of these at most
+  /// @throws Error if the size does not match, or one is negative or not finite.
+  void set_noise(std::span<const float> deviation);
+  /// The same of another image of that size. @throws Error if it is not.
+  void set_noise(Noise noise);
 
   [[nodiscard]] bool scale_unsure() const noexcept override { return scale_unsure_; }
   void set_scale_unsure(bool is_unsure) noexcept { scale_unsure_ = is_unsure; }  ///< likewise
@@ -179,6 +194,9 @@ class DepthImage final : public Cloud {
 
   /// [m] along the optical axis at pixel (u, v), which must be in the image; 0 for a hole.
   [[nodiscard]] double depth_at(int u, int v) const noexcept;
+  /// [m] Standard deviation of the reading of pixel (u, v), which must be in the image: what was
+  /// set, and no less than rounding to the unit makes; `usual` [m] of a hole, or if none was set.
+  [[nodiscard]] double noise_at(int u, int v, double usual) const noexcept;
   /// The point that pixel (u, v) measured [m, world]; none for a hole or outside the image.
   [[nodiscard]] std::optional<Vec3> deproject(int u, int v) const noexcept;
   /// All measured points [m, world], row by row.
@@ -195,6 +213,7 @@ class DepthImage final : public Cloud {
   Eigen::Isometry3d world_from_camera_;
   std::vector<std::uint8_t> brightness_;
   std::shared_ptr<const MaterialMap> materials_;
+  Noise noise_;
 };
 
 inline double DepthImage::depth_at(int u, int v) const noexcept {
@@ -202,6 +221,15 @@ inline double DepthImage::depth_at(int u, int v) const noexcept {
       depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(rays_->intrinsics().width) +
              static_cast<std::size_t>(u)];
   return is_measured(raw) ? raw * metres_per_unit_ : 0.0;
+}
+
+inline double DepthImage::noise_at(int u, int v, double usual) const noexcept {
+  if (!noise_ || depth_at(u, v) == 0.0) return usual;
+  constexpr double rounding = 0.28867513459481287;  // [units] a step's, 1 / sqrt(12)
+  const double steps =
+      (*noise_)[static_cast<std::size_t>(v) * static_cast<std::size_t>(intrinsics().width) +
+                static_cast<std::size_t>(u)];
+  return std::max(steps / noise_steps, rounding) * metres_per_unit_;
 }
 
 }  // namespace palpate

@@ -85,6 +85,16 @@ class Cloud {
   /// [servo] As `gather`.
   [[nodiscard]] virtual double spacing(const Vec3& /*place*/) const noexcept { return 0.0; }
 
+  /// Does it know the noise of its own readings?
+  [[nodiscard]] virtual bool has_noise() const noexcept { return false; }
+  /// [m] Standard deviation of the depth that was read at `place` [m, world]: what the cloud knows
+  /// of that reading, or else `usual` [m], which the noise model says (usual_noise_at).
+  ///
+  /// [servo] As `gather`.
+  [[nodiscard]] virtual double noise_at(const Vec3& /*place*/, double usual) const noexcept {
+    return usual;
+  }
+
   /// Does it know what its surfaces are made of?
   [[nodiscard]] virtual bool has_materials() const noexcept { return false; }
   /// Does it know how bright they are?

@@ -70,7 +70,9 @@ void FusedImage::move_to(int u, int v) noexcept {
 // their relief. False if there are too few.
 bool FusedImage::find_level(int u, int v, double radius) noexcept {
   std::array<float, std::size_t{most_across + 2} * (most_across + 2)> values;
+  double noise = 0.0;
   const auto look = [&](double within) {
+    noise = 0.0;
     const int reach = std::max(1, static_cast<int>(within));
     const int stride = 1 + 2 * reach / most_across;
     std::size_t size = 0;
@@ -81,8 +83,9 @@ bool FusedImage::find_level(int u, int v, double radius) noexcept {
             y >= camera_.height)
           continue;
         const auto z = static_cast<float>(image_->depth_at(x, y));
-        if (z > 0.0F && window_[0].frames[index(x, y)] > 0.0F)
-          values[size++] = z - window_[0].relief[index(x, y)];
+        if (!(z > 0.0F && window_[0].frames[index(x, y)] > 0.0F)) continue;
+        values[size++] = z - window_[0].relief[index(x, y)];
+        noise += image_->noise_at(x, y, 1.0);
       }
     }
     return std::span(values.data(), size);
@@ -99,11 +102,13 @@ bool FusedImage::find_level(int u, int v, double radius) noexcept {
   const std::span<float> wide = look(spread_region * radius);
   if (wide.size() < least_pixels) return false;
   spread_ = next_spread(spread_, newest_, wide, image_->units_per_metre());
+  mean_noise_ = noise / static_cast<double>(wide.size());
   return true;
 }
 
 // Takes the newest reading [m], 0 for none, into a pixel's relief.
-void FusedImage::update(std::size_t i, float z) noexcept {
+// @param spread  [m] standard deviation of the reading
+void FusedImage::update(std::size_t i, float z, float spread) noexcept {
   Window& known = window_[0];
   if (z == 0.0F) {
     known.missed[i] += 1.0F;
@@ -111,14 +116,16 @@ void FusedImage::update(std::size_t i, float z) noexcept {
     return;
   }
   known.missed[i] = 0.0F;
-  follow_relief(z - newest_, spread_, most_frames, known.relief[i], known.drift[i],
-                known.frames[i]);
+  follow_relief(z - newest_, spread, most_frames, known.relief[i], known.drift[i], known.frames[i]);
 }
 
 void FusedImage::update() noexcept {
+  // The spread is measured; how it differs from pixel to pixel is what the image says.
+  const double per_noise = spread_ / mean_noise_;
   for (int v = std::max(v_, 0); v < std::min(v_ + side, camera_.height); ++v) {
     for (int u = std::max(u_, 0); u < std::min(u_ + side, camera_.width); ++u)
-      update(index(u, v), static_cast<float>(image_->depth_at(u, v)));
+      update(index(u, v), static_cast<float>(image_->depth_at(u, v)),
+             static_cast<float>(per_noise * image_->noise_at(u, v, mean_noise_)));
   }
 }
 

@@ -75,7 +75,7 @@ class FusedImage final : public Cloud {
   void move_to(int u, int v) noexcept;
   bool find_level(int u, int v, double radius) noexcept;
   void update() noexcept;
-  void update(std::size_t i, float z) noexcept;
+  void update(std::size_t i, float z, float spread) noexcept;
   /// Of a pixel of the image in the window, which it keeps while the window moves.
   [[nodiscard]] static std::size_t index(int u, int v) noexcept {
     return static_cast<std::size_t>((v & (side - 1)) * side + (u & (side - 1)));
@@ -99,6 +99,7 @@ class FusedImage final : public Cloud {
   std::array<HeightSample, most_heights> levels_{};  // the newest first
   float newest_ = 0.0F;                              // [m] the newest frame's level
   float spread_ = 0.0F;                              // [m] of pixels about level and relief
+  double mean_noise_ = 1.0;                          // [m] that the image says of these pixels
   double level_ = 0.0;                               // [m] as estimated
   double correction_ = 0.0;                          // [m]
   double velocity_ = 0.0;                            // [m/s]

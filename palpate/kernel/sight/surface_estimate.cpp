@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-using Vec5 = Eigen::Matrix<double, 5, 1>;
+using Vec5 = Eigen::Matrix<double, 5, 1>;  // as SurfaceEstimate's
 
 constexpr double widest_gate = 12.0;  // [detail]
 constexpr std::size_t inner_points = 768;
@@ -67,11 +67,14 @@ double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t 
 // How many of the newest readings, 2, 4 or 8, differ from those before; 0: none. Noise of depth
 // cameras correlates from frame to frame by up to 0.85: so much of a single one's deviation is left
 // in a mean.
-// @param reading  [m] of a frame, by its age
-// @param most     [m] that a single one may deviate
+// @param worth    [-] of so many of the newest frames, from 0 to all: one over a reading's variance
+//                 in usual ones is what a frame is worth
+// @param most     [m] that a single usual one may deviate
+// @param reading  [m] of a frame, by its age, times what that is worth
 template <class Reading>
-std::size_t changed_since(std::size_t frames, double most, const Reading& reading) {
+std::size_t changed_since(std::span<const double> worth, double most, const Reading& reading) {
   constexpr std::array<double, 3> left = {0.96, 0.91, 0.80};  // [-]
+  const std::size_t frames = worth.size() - 1;
   double all = 0.0;
   for (std::size_t i = 0; i < frames; ++i) all += reading(i);
   double newest = 0.0;
@@ -80,9 +83,11 @@ std::size_t changed_since(std::size_t frames, double most, const Reading& readin
     const std::size_t window = std::size_t{2} << i;
     if (frames < 2 * window) return 0;
     for (; added < window; ++added) newest += reading(added);
-    const double change = newest / static_cast<double>(window) -
-                          (all - newest) / static_cast<double>(frames - window);
-    if (std::abs(change) > left[i] * most) return window;
+    const double before = worth[frames] - worth[window];
+    const double change = newest / worth[window] - (all - newest) / before;
+    // Of frames that are worth less a mean is so much less certain.
+    const double unsure = std::sqrt(static_cast<double>(window) / std::min(worth[window], before));
+    if (std::abs(change) > left[i] * unsure * most) return window;
   }
   return 0;
 }
@@ -151,8 +156,8 @@ double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noe
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
   const double most = 4.0 * spread_ + 0.1 * detail();
   const double floor = squared(least_sd * detail());
-  const double usual = squared(std::min(parameters_.usual_noise_at(distances_[camera]), most)) +
-                       0.03 * squared(spread_) + floor;
+  const double reading = noisier_[camera] * usual_noise(camera);
+  const double usual = squared(std::min(reading, most)) + 0.03 * squared(spread_) + floor;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
   double wider = 0.0;
   for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatters[j].variance);
@@ -300,6 +305,26 @@ bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexc
   return true;
 }
 
+double SurfaceEstimate::usual_noise(std::size_t camera) const noexcept {
+  return parameters_.usual_noise_at(distances_[camera]);
+}
+
+double SurfaceEstimate::weigh(const Cloud& cloud, double usual) noexcept {
+  constexpr double most = 1e12;  // [-] a ratio of weights that is still a float
+  is_weighted_ = cloud.has_noise() && points_.size > 0 && points_.size == patch_.size();
+  if (!is_weighted_) return 1.0;
+  weights_.fill(0.0F);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < points_.size; ++i) {
+    const Vec3 point(patch_.x()[i], patch_.y()[i], patch_.z()[i]);
+    const double noise = cloud.noise_at(patch_.ball().centre + point, usual);
+    const double weight = std::clamp(squared(usual / noise), 1.0 / most, most);
+    weights_[i] = static_cast<float>(weight);
+    sum += weight;
+  }
+  return sum / static_cast<double>(points_.size);
+}
+
 // Measures the surface around `foot` in the newest frame, and estimates anew from all frames.
 bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& look,
                               bool new_frame) noexcept {
@@ -308,9 +333,20 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   const double deep = wide + 2.0 * radii_[1];
   gather(cloud, Beam{place, radii_[1] * 1.2, deep, frame_.up}, inner_points, patch_);
   points_.take(patch_, frame_);
+  const bool first = count_ == 0;
+  const std::size_t camera = new_frame || first ? camera_ : this->camera();
+  const double usual = usual_noise(camera);
+  const double information = weigh(cloud, usual);
+  // [m] of a point that weighs 1: the inner disc's points weigh that in the mean
+  const double reading = usual / std::sqrt(information);
+  if (is_weighted_)
+    for (float& weight : weights_) weight /= static_cast<float>(information);
+  const auto moments_of = [this](const Disc& disc, bool is_weighted) {
+    return disc_moments(patch_, frame_, surface_, disc, unit(),
+                        is_weighted ? weights_.data() : nullptr);
+  };
   const Quadric before = surface_;
   double cut = 0.0;
-  const bool first = count_ == 0;
   // Without an estimate to start from, the shape is found by iterating the fit.
   for (int i = 0; i < (first ? 3 : 1); ++i) {
     if (!recentre(foot, wide, cut)) {
@@ -318,9 +354,8 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
       return false;
     }
     if (!first) break;
-    Moments moments =
-        disc_moments(patch_, frame_, surface_,
-                     Disc{foot, 0.0, radii_[1], std::max(cut, 0.4 * detail())}, unit());
+    const Moments moments =
+        moments_of({foot, 0.0, radii_[1], std::max(cut, 0.4 * detail())}, is_weighted_);
     if (moments.xy[0] < 6.0) {
       surface_ = before;
       return false;
@@ -349,10 +384,15 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   now.centre = foot;
   now.whole = !look.partial;
   now.lost = 0;
+  now.information = information;
+  noisier_[camera] = 1.0 / std::sqrt(information);
   const auto add_ring = [&](std::size_t j) {
-    Moments moments = disc_moments(
-        patch_, frame_, surface_, Disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut}, unit());
-    now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
+    const Disc disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut};
+    Moments moments = moments_of(disc, is_weighted_);
+    // Where points are, and how many, does not depend on their noise.
+    const Moments all = is_weighted_ ? moments_of(disc, false) : moments;
+    now.extent[j] = all.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
+    if (j == 0) middle_ = Eigen::Map<const Vec5>(&all.xy[1]) / std::max(all.xy[0], 1e-9);
     moments.raise(surface_, unit());
     if (j > 0) moments.add(now.disc[j - 1]);
     now.disc[j] = moments;
@@ -371,6 +411,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     const double widest = radii_[most - 1];
     gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
     points_.take(patch_, frame_);
+    weigh(cloud, reading);
     // Noise that is common to the inner disc is not common to the wide ones: their outliers are
     // judged by their own median and deviation.
     if (const std::optional<Residuals> far = residuals(foot, widest, wide)) {
@@ -381,7 +422,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     now.rungs = most;
   }
   for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
-  if (first && !spans_area(now.shape[0])) {
+  if (first && !spans_area()) {
     surface_ = before;
     count_ = 0;
     return false;
@@ -414,6 +455,20 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
   std::array<std::array<HeightSample, history>, rungs> heights;
   std::array<std::size_t, rungs> frames{};
   std::size_t chosen = 0;
+  // What the frames say of their own noise: [-] what one is worth beside its camera's others.
+  std::array<double, Patch::max_views> information{}, told{};
+  for (std::size_t i = 0; i < count_; ++i) {
+    information[evidence(i).camera] += evidence(i).information;
+    ++told[evidence(i).camera];
+  }
+  std::array<double, history> worth;
+  std::array<double, history + 1> worth_of;  // so many of the newest
+  worth_of[0] = 0.0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Evidence& e = evidence(i);
+    worth[i] = e.information / (information[e.camera] / told[e.camera]);
+    worth_of[i + 1] = worth_of[i] + worth[i];
+  }
   const std::size_t averaged =
       std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
   for (std::size_t j = 0; j < now.rungs; ++j) {
@@ -432,7 +487,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
       if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
       // A partly hidden disc determines the height, but hardly the slope.
       if (!e.whole && n > 0) continue;
-      sums += 1.0 / doubts[e.camera] * e.shape[j].sums;
+      sums += worth[n] / doubts[e.camera] * e.shape[j].sums;
       if (++whole == std::size_t{2} << filled && filled < slope_windows) {
         windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
       }
@@ -460,7 +515,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
     for (std::size_t i = 0; i < n; ++i) {
       const Evidence& e = evidence(i);
       heights[j][i] = {e.stamp,
-                       (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * unit()};
+                       (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * unit(),
+                       1.0 / worth[i]};
       usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
     }
     // A disc that an occluder begins to hide has fewer points and more noise.
@@ -468,7 +524,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
       const Evidence& e = evidence(i);
       HeightSample& height = heights[j][i];
       const double share = e.extent[j] / usual_extent[e.camera];
-      if (share < 0.8) height.doubt = 1.0 / squared(std::max(share, 0.1));
+      if (share < 0.8) height.doubt /= squared(std::max(share, 0.1));
       if (e.camera == now.camera && own < h.size()) h[own++] = height;
       height.doubt *= doubts[e.camera];
     }
@@ -518,11 +574,11 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
       const std::size_t n = std::min(frames[i], frames[j]);
       const auto [sum, squares] = sums_over<2>(n, [&](std::size_t k) {
         const double d = heights[j][k].height - heights[i][k].height;
-        return std::array{d, d * d};
+        return std::array{worth[k] * d, worth[k] * d * d};
       });
       const auto count = static_cast<double>(n);
-      const double mean = sum / count;
-      const double about_mean = std::max(squares - count * mean * mean, 0.0);
+      const double mean = sum / worth_of[n];
+      const double about_mean = std::max(squares - worth_of[n] * mean * mean, 0.0);
       // Noise falls at most with the area it is averaged over, so the difference from the next
       // narrower disc is a lower bound of a disc's noise.
       if (i + 1 == j && n >= 4) {
@@ -537,23 +593,27 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
       // What is not measured yet is bounded, not estimated.
       const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
       const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
-      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
+      agree =
+          agree && std::abs(mean) <= confidence * std::sqrt(scattered / worth_of[n]) + negligible;
       // What slides in under a contact at rest changes the newest frames alone: of the mean over
       // all it is a small part, and it scatters. Only noise that was measured before shows it.
       const auto most = [&](double variance) { return sds * std::sqrt(variance) + negligible; };
-      const bool differs = measured(i) && measured(j) &&
-                           changed_since(n, most(variance(i) + variance(j)), [&](std::size_t k) {
-                             return heights[j][k].height - heights[i][k].height;
-                           }) > 0;
+      const std::span<const double> so_many(worth_of.data(), n + 1);
+      const bool differs =
+          measured(i) && measured(j) &&
+          changed_since(so_many, most(variance(i) + variance(j)), [&](std::size_t k) {
+            return worth[k] * (heights[j][k].height - heights[i][k].height);
+          }) > 0;
       // Where the narrower one has changed itself, it is another surface that is touched.
       if (differs && learns && changed == 0)
-        changed = changed_since(n, most(variance(i)),
-                                [&](std::size_t k) { return heights[i][k].height; });
+        changed = changed_since(so_many, most(variance(i)),
+                                [&](std::size_t k) { return worth[k] * heights[i][k].height; });
       agree = agree && !differs;
       const double newest = heights[j][0].height - heights[i][0].height;
-      moves_along = agree || (n >= 4 && !differs &&
-                              std::abs(newest - mean) <=
-                                  parameters_.confidence * std::sqrt(scattered) + negligible);
+      moves_along =
+          agree || (n >= 4 && !differs &&
+                    std::abs(newest - mean) <=
+                        parameters_.confidence * std::sqrt(scattered / worth[0]) + negligible);
     }
     if (!moves_along) break;
     if (agree && variance(j) <= variance(chosen)) chosen = j;
@@ -698,21 +758,19 @@ double SurfaceEstimate::squared_structure(
 
 // Do the points span an area, so that they determine a slope? Those of a border seen from its side
 // lie in a line.
-bool SurfaceEstimate::spans_area(const Shape& inner) const noexcept {
-  const double xx = inner.means[2] - squared(inner.means[0]);
-  const double xy = inner.means[3] - inner.means[0] * inner.means[1];
-  const double yy = inner.means[4] - squared(inner.means[1]);
+bool SurfaceEstimate::spans_area() const noexcept {
+  const double xx = middle_[2] - squared(middle_[0]);
+  const double xy = middle_[3] - middle_[0] * middle_[1];
+  const double yy = middle_[4] - squared(middle_[1]);
   const double least = 0.5 * (xx + yy) - math::hypot(0.5 * (xx - yy), xy);
   return least > 0.05 * full_disc();
 }
 
 // Does the fit describe the surface, up to noise?
 void SurfaceEstimate::judge(const Vec2& foot) noexcept {
-  const Evidence& now = evidence(0);
   // At an edge the points lie to one side of the disc, at a gap around an empty middle.
-  const Shape& inner = now.shape[0];
-  const Vec2 middle(inner.means[0], inner.means[1]);
-  const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
+  const Vec2 middle = middle_.head<2>();
+  const Vec2 spread = Vec2(middle_[2], middle_[4]) - Vec2(middle.cwiseAbs2());
   // Hysteresis, so that the way to rest does not change from frame to frame.
   const double slack = smooth_ ? 0.5 : 0.35;
   const bool whole = (middle * unit() - foot).norm() < 0.85 * slack * radii_[0] &&

@@ -37,7 +37,10 @@ class SurfaceEstimate {
     bool partial = false;  ///< something hides a part of it: where points end is no edge
   };
 
-  SurfaceEstimate() noexcept { set_spacing(0.0); }
+  SurfaceEstimate() noexcept {
+    noisier_.fill(1.0);
+    set_spacing(0.0);
+  }
   void set(const SightParameters& parameters) noexcept;
   /// A frame of `camera` at `stamp` [s], `interval` [s] after that camera's one before, will be
   /// measured.
@@ -129,6 +132,7 @@ class SurfaceEstimate {
   static constexpr std::size_t least_points = 8;
 
  private:
+  using Vec5 = Eigen::Matrix<double, 5, 1>;
   static constexpr std::size_t history = most_heights;
   static constexpr std::size_t frames_of_a_camera = 64;
   static constexpr int cells_per_side = 4;
@@ -138,15 +142,13 @@ class SurfaceEstimate {
   /// curvature.
   struct Shape {
     using Sums = Eigen::Matrix<double, 20, 1>;  // they add up over frames
-    Sums sums;                          // lower triangle of the matrix, row by row, and right side
-    Eigen::Matrix<double, 5, 1> means;  // of x, y, xx, xy, yy
-    double height;                      // mean z [unit]
+    Sums sums;      // lower triangle of the matrix, row by row, and right side
+    Vec5 means;     // of x, y, xx, xy, yy
+    double height;  // mean z [unit]
     double points;
 
     static Eigen::Matrix<double, 5, 5> matrix(const Sums& sums) noexcept;
-    static Eigen::Matrix<double, 5, 1> right_side(const Sums& sums) noexcept {
-      return sums.tail<5>();
-    }
+    static Vec5 right_side(const Sums& sums) noexcept { return sums.tail<5>(); }
     static Shape of(const Moments& disc) noexcept;
   };
   /// What was measured in one frame.
@@ -161,6 +163,7 @@ class SurfaceEstimate {
     std::array<Moments, SurfaceEstimate::rungs> disc;
     std::array<Shape, SurfaceEstimate::rungs> shape;
     std::array<double, SurfaceEstimate::rungs> extent;  // points in reach, thinned or not
+    double information = 1.0;  // [-] mean of (usual noise / reading's noise)^2
   };
   /// Means over the points in each cell of a square about a frame's contact. Cells are those of a
   /// lattice through the local origin, so that frames can be compared while the contact slides.
@@ -192,11 +195,15 @@ class SurfaceEstimate {
   [[nodiscard]] std::optional<Residuals> residuals(const Vec2& foot, double radius,
                                                    double gate) const noexcept;
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
+  [[nodiscard]] double usual_noise(std::size_t camera) const noexcept;
+  /// Weighs the patch's points by what `cloud` says of their noise: (usual / noise)^2 each.
+  /// @param usual  [m]  @return their mean; 1, and no weights, if it says nothing
+  double weigh(const Cloud& cloud, double usual) noexcept;
   void estimate(const Vec2& foot, bool new_frame, bool learns) noexcept;
   void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
   [[nodiscard]] double squared_structure(const Cells& frame,
                                          const std::array<double, cells>& residuals) const noexcept;
-  [[nodiscard]] bool spans_area(const Shape& inner) const noexcept;
+  [[nodiscard]] bool spans_area() const noexcept;
   /// [m] of the moments.
   [[nodiscard]] double unit() const noexcept { return 2.0 * detail(); }
   /// Variance of a full narrowest disc along each axis [unit^2].
@@ -229,7 +236,9 @@ class SurfaceEstimate {
 
   SightParameters parameters_;
   Patch patch_;
-  LocalPoints points_;  // of the patch
+  LocalPoints points_;                                // of the patch
+  std::array<float, LocalPoints::capacity> weights_;  // of the same
+  bool is_weighted_ = false;
   LocalFrame frame_;
   Quadric surface_;
   Vec2 centre_ = Vec2::Zero();
@@ -237,8 +246,9 @@ class SurfaceEstimate {
   double interval_ = 1.0 / 30.0;
   double velocity_ = 0.0;
   double spread_ = 0.0;
-  std::size_t rung_ = 0;   // the disc that determines shape and height
-  std::size_t mover_ = 0;  // the disc that determines motion
+  Vec5 middle_ = Vec5::Zero();  // means over the narrowest disc's points, as Shape's, unweighted
+  std::size_t rung_ = 0;        // the disc that determines shape and height
+  std::size_t mover_ = 0;       // the disc that determines motion
 
   std::array<Evidence, history> ring_;
   std::array<Cells, cell_frames> cells_;
@@ -254,6 +264,7 @@ class SurfaceEstimate {
   std::size_t cameras_ = 1;                        // of the frames that are remembered
   std::array<bool, Patch::max_views> is_known_{};  // those
   std::array<double, Patch::max_views> distances_{};  // [m] from the viewpoints
+  std::array<double, Patch::max_views> noisier_;      // [-] than usual its readings are, as it says
   std::array<double, rungs> radii_{};                 // [m] of the discs
   double cell_size_ = 0.0;                            // [m]
 

@@ -47,10 +47,12 @@ struct Rows {
   float x[3], y[3], z[3], offset[3];
 };
 
-PALPATE_VECTORISED
-FloatMoments sum_moments(const float* px, const float* py, const float* pz, std::size_t size,
-                         const Rows rows, const float* coefficients, float centre_x, float centre_y,
-                         float inner_squared, float outer_squared, float inverse_cut) {
+template <bool is_weighted>
+PALPATE_VECTORISED FloatMoments sum_moments(const float* px, const float* py, const float* pz,
+                                            const float* weight, std::size_t size, const Rows rows,
+                                            const float* coefficients, float centre_x,
+                                            float centre_y, float inner_squared,
+                                            float outer_squared, float inverse_cut) {
   std::array<FloatLanes, moment_count> sums{};
   const std::array<float, 6> c{coefficients[0], coefficients[1], coefficients[2],
                                coefficients[3], coefficients[4], coefficients[5]};
@@ -78,7 +80,8 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
       float t = r * inverse_cut;
       t = t * t;
       t = t < 1.0F ? 1.0F - t : 0.0F;
-      const float w = in_disc * t * t;  // Tukey's biweight
+      float w = in_disc * t * t;  // Tukey's biweight
+      if constexpr (is_weighted) w *= weight[i];
       const float wx = w * x;
       const float wy = w * y;
       const float wxx = w * xx;
@@ -289,14 +292,18 @@ Moments Moments::moved(const Vec3& s) const noexcept {
 }
 
 Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric& surface,
-                     const Disc& disc, double unit) noexcept {
+                     const Disc& disc, double unit, const float* weight) noexcept {
   const Rows rows = rows_of(frame, patch.ball().centre, unit);
   const Eigen::Matrix<float, 6, 1> c = in_units(surface.c, unit).cast<float>();
   const auto squared = [unit](double r) { return static_cast<float>((r / unit) * (r / unit)); };
-  const FloatMoments sums = vectorised<sum_moments>(
-      patch.x(), patch.y(), patch.z(), patch.padded_size(), rows, c.data(),
-      static_cast<float>(disc.centre.x() / unit), static_cast<float>(disc.centre.y() / unit),
-      squared(disc.inner), squared(disc.outer), static_cast<float>(unit / disc.cut));
+  const auto sum = [&](const auto& loop) {
+    return loop(patch.x(), patch.y(), patch.z(), weight, patch.padded_size(), rows, c.data(),
+                static_cast<float>(disc.centre.x() / unit),
+                static_cast<float>(disc.centre.y() / unit), squared(disc.inner),
+                squared(disc.outer), static_cast<float>(unit / disc.cut));
+  };
+  const FloatMoments sums =
+      weight == nullptr ? sum(vectorised<sum_moments<false>>) : sum(vectorised<sum_moments<true>>);
   Moments moments;
   const auto z = sums.begin() + static_cast<std::ptrdiff_t>(moments.xy.size());
   std::copy(sums.begin(), z, moments.xy.begin());

@@ -135,9 +135,10 @@ struct Disc {
 };
 
 /// Moments of the residuals of a patch's points over `surface`, Tukey-weighted. O(points).
-/// @param unit  [m] of the moments
+/// @param unit    [m] of the moments
+/// @param weight  [-] of each of the patch's points, and of those that fill its last block; null: 1
 Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric& surface,
-                     const Disc& disc, double unit) noexcept;
+                     const Disc& disc, double unit, const float* weight = nullptr) noexcept;
 
 /// Quadric from moments with every frame's height free or not, in metres.
 /// @param curvature_prior  added to the diagonal of the curvature terms: how many points' worth of

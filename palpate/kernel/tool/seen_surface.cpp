@@ -38,6 +38,7 @@ constexpr int most_across = 15;          // cells that measure the level, along 
 constexpr std::size_t least_cells = 8;   // that measure a level
 constexpr double nearest_camera = 1e-3;  // [m] from it to a place, along its axis
 constexpr double farthest_pixel = 1e6;   // [px] beyond any image
+constexpr double least_noise = 1e-6;     // [m] to divide by
 constexpr int coarsest = 16;             // [px] of a cell
 constexpr double steepest = 2.75;        // [-] slope of 70 degrees: steeper is an edge
 constexpr float layer = 10e-3F;          // [m] pixels of one cell farther apart are of two surfaces
@@ -72,6 +73,11 @@ constexpr int farthest_out = 48;  // [cells] to where a body is pushed away, tha
 // [m] What comes nearer by more between two frames hides what was there.
 float strike(const SightParameters& parameters) {
   return static_cast<float>(farthest_strike * parameters.detail);
+}
+
+// [m] A reading's noise at 1 m.
+double usual_at_1m(const SightParameters& parameters) {
+  return parameters.usual_noise > 0.0 ? parameters.usual_noise : SightParameters::unknown_noise;
 }
 
 // (4), block by block: compilers make vector code of all but the look-up.
@@ -191,6 +197,25 @@ float SeenSurface::read(int u, int v) const noexcept {
   return size == 0 ? 0.0F : sum / of;
 }
 
+double SeenSurface::noise_of(int u, int v) const noexcept {
+  const Intrinsics& k = image_->intrinsics();
+  return image_->noise_at(std::clamp(u * stride_ + stride_ / 2, 0, k.width - 1),
+                          std::clamp(v * stride_ + stride_ / 2, 0, k.height - 1), mean_noise_);
+}
+
+float SeenSurface::weigh(int u, int v) noexcept {
+  const auto noisier = static_cast<float>(noise_of(u, v) / mean_noise_);
+  cells_[0].weight[index(u, v)] = 1.0F / (noisier * noisier);
+  return noisier * spread_;
+}
+
+double SeenSurface::noise_at_1m(const Vec3& place,
+                                const SightParameters& parameters) const noexcept {
+  const double said = image_->noise_at(place, 0.0);
+  const double z = std::max(in_camera(place).z(), nearest_camera);
+  return said > 0.0 ? said / (z * z) : usual_at_1m(parameters);
+}
+
 void SeenSurface::start_cell(int u, int v) noexcept {
   Cells& all = cells_[0];
   const std::size_t i = index(u, v);
@@ -210,6 +235,7 @@ void SeenSurface::start_cell(int u, int v) noexcept {
   all.drift[i] = 0.0F;
   all.frames[i] = z > 0.0F ? 1.0F : 0.0F;
   all.seen[i] = stamp_;
+  if (image_->has_noise()) weigh(u, v);
 }
 
 // Keeps the cells about a tool; what they leave is forgotten.
@@ -265,25 +291,29 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
   const float hidden = frames_ > 1 ? static_cast<float>(level(stamp_)) - strike(parameters)
                                    : std::numeric_limits<float>::lowest();
   std::size_t size = 0, known = 0;
+  double noise = 0.0;
   for (int y = v_ + side / 2 - reach; y <= v_ + side / 2 + reach; y += step) {
     for (int x = u_ + side / 2 - reach; x <= u_ + side / 2 + reach; x += step) {
       const float relief = all.relief[index(x, y)];
       const float z = read(x, y);
       if (!(z > 0.0F && relief == relief && known < values.size())) continue;
       ++known;
-      if (z - relief >= hidden) values[size++] = z - relief;
+      if (!(z - relief >= hidden)) continue;
+      values[size++] = z - relief;
+      noise += noise_of(x, y);
     }
   }
   if (size < least_cells || 2 * size < known) return false;
   const std::span<float> near(values.data(), size);
   newest_ = kth_smallest(near, size / 2);
   spread_ = next_spread(spread_, newest_, near, image_->units_per_metre());
+  mean_noise_ = noise / static_cast<double>(size);
   // How much one frame's level varies: by second differences, which no steady motion changes.
   constexpr double memory = 0.05;  // [-] of the newest of them
   if (frames_ >= 2) {
     const double bend = newest_ - 2.0 * levels_[0].height + levels_[1].height;
-    const double usual =
-        parameters.usual_noise > 0.0 ? parameters.usual_noise : SightParameters::unknown_noise;
+    // An image that is too sure of itself must not make the level so.
+    const double usual = std::max(noise_at_1m(aim.place, parameters), usual_at_1m(parameters));
     const double size_of = std::min(bend * bend / 6.0, p.squaredNorm() * usual * usual);
     wobble_ = std::sqrt((1.0 - memory) * wobble_ * wobble_ + memory * size_of);
   }
@@ -291,7 +321,9 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
 }
 
 // Takes the newest reading [m], 0 for none, into a cell's relief (7).
-void SeenSurface::update(std::size_t i, float z, const SightParameters& parameters) noexcept {
+// @param spread  [m] standard deviation of the reading
+void SeenSurface::update(std::size_t i, float z, float spread,
+                         const SightParameters& parameters) noexcept {
   Cells& all = cells_[0];
   if (!(all.frames[i] > 0.0F)) {
     if (z > 0.0F) {
@@ -310,7 +342,7 @@ void SeenSurface::update(std::size_t i, float z, const SightParameters& paramete
     return;
   }
   all.seen[i] = stamp_;
-  follow_relief(z - newest_, spread_, most_relief, all.relief[i], all.drift[i], all.frames[i]);
+  follow_relief(z - newest_, spread, most_relief, all.relief[i], all.drift[i], all.frames[i]);
 }
 
 // Is a reading [m] between a surface and what hides it beside this cell? It measures neither.
@@ -374,6 +406,7 @@ void SeenSurface::slide() noexcept {
 void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcept {
   if (rows_read_ == side) return;
   const float nearer = strike(parameters);
+  const bool has_noise = image_->has_noise();
   for (; rows > 0 && rows_read_ < side; --rows, ++rows_read_) {
     const int v = v_ + ((rows_read_ - v_) & (side - 1));  // each row of the memory once
     for (int u = u_; u < u_ + side; ++u) {
@@ -386,7 +419,7 @@ void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcep
         cells_[0].slides[i] = z - newest_;
         slides_ = true;
       }
-      update(i, flying ? 0.0F : z, parameters);
+      update(i, flying ? 0.0F : z, has_noise ? weigh(u, v) : spread_, parameters);
     }
   }
   if (rows_read_ < side) return;
@@ -410,8 +443,8 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
     slides_ = false;
     newest_ = static_cast<float>(in_camera(aim.place).z());
     spread_ = 0.0F;
-    const double usual =
-        parameters.usual_noise > 0.0 ? parameters.usual_noise : SightParameters::unknown_noise;
+    const double usual = noise_at_1m(aim.place, parameters);
+    mean_noise_ = std::max(least_noise, usual * newest_ * newest_);
     // [-] of a reading's noise that is left in the median of many, which correlate.
     constexpr double left = 0.2;
     wobble_ = left * usual * newest_ * newest_;
@@ -665,8 +698,9 @@ double SeenSurface::speed_along(const Vec3& from, const Vec3& way) const noexcep
 }
 
 // The plane through the cells on a lattice, `step` apart, of so many on either side of the middle.
-SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int step,
-                                            const Narrower* narrower) const noexcept {
+template <bool is_weighted>
+SeenSurface::Plane SeenSurface::plane_through(const Middle& middle, int cells, int step,
+                                              const Narrower* narrower) const noexcept {
   const Cells& all = cells_[0];
   const int middle_u = static_cast<int>(std::lround(middle.x));
   const int middle_v = static_cast<int>(std::lround(middle.y));
@@ -674,7 +708,7 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int
   const auto first = [&](int at) { return at < reach ? at % step : at - reach; };
   double sx = 0.0, sy = 0.0, sz = 0.0, xx = 0.0, xy = 0.0, yy = 0.0, xz = 0.0, yz = 0.0, zz = 0.0;
   Plane plane;
-  double looked = 0.0;
+  double looked = 0.0, of = 0.0;
   for (int v = first(middle_v); v <= std::min(middle_v + reach, side - 1); v += step) {
     for (int u = first(middle_u); u <= std::min(middle_u + reach, side - 1); u += step) {
       const double z = all.shown[static_cast<std::size_t>(v * side + u)];
@@ -688,22 +722,23 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int
       if (!(std::abs(px) + std::abs(py) < farthest_cell)) continue;  // nor a pixel without a ray
       ++looked;
       if (narrower != nullptr && !narrower->explains(px, py, z, away)) continue;
-      sx += px;
-      sy += py;
-      sz += pz;
-      xx += px * px;
-      xy += px * py;
-      yy += py * py;
-      xz += px * pz;
-      yz += py * pz;
-      zz += pz * pz;
+      const double w = is_weighted ? double{all.weight[i]} : 1.0;
+      of += w;
+      sx += w * px;
+      sy += w * py;
+      sz += w * pz;
+      xx += w * px * px;
+      xy += w * px * py;
+      yy += w * py * py;
+      xz += w * px * pz;
+      yz += w * py * pz;
+      zz += w * pz * pz;
       plane.newest = std::max(plane.newest, all.seen[i]);
       ++plane.cells;
     }
   }
   if (plane.cells == 0) return plane;
-  const auto of = static_cast<double>(plane.cells);
-  plane.part = of / looked;
+  plane.part = static_cast<double>(plane.cells) / looked;
   const double mx = sx / of, my = sy / of, mz = sz / of;
   plane.height = middle.from + mz;
   const double pitch = cell_at(middle.p.z());
@@ -716,8 +751,15 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int
   plane.slope = Eigen::Vector2d(cyy * cxz - cxy * cyz, cxx * cyz - cxy * cxz) / determinant;
   plane.height -= plane.slope.x() * mx + plane.slope.y() * my;
   const double left = zz - sz * mz - plane.slope.x() * cxz - plane.slope.y() * cyz;
-  plane.scatter = std::sqrt(std::max(left, 0.0) / of);
+  // Of cells of the mean noise: weights take a noisier one's as so much less.
+  plane.scatter = std::sqrt(std::max(left, 0.0) / static_cast<double>(plane.cells));
   return plane;
+}
+
+SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int step,
+                                            const Narrower* narrower) const noexcept {
+  return image_->has_noise() ? plane_through<true>(middle, cells, step, narrower)
+                             : plane_through<false>(middle, cells, step, narrower);
 }
 
 }  // namespace palpate

@@ -39,7 +39,7 @@ class SeenSurface {
     bool wall;      ///< the side of a body of which the camera sees the edge alone
   };
 
-  SeenSurface() : cells_(1) {}
+  SeenSurface() : cells_(1) { cells_[0].weight.fill(1.0F); }
 
   /// A new frame. @param stamp, interval  [s] of it, and until the next
   void observe(const DepthImage& image, const Aim& aim, double stamp, double interval,
@@ -117,6 +117,7 @@ class SeenSurface {
     std::array<double, count> slid;   // [s] stamp of the frame that slid a body over it; NaN: none
     std::array<float, count> ray_x;   // [-] of the ray through its middle
     std::array<float, count> ray_y;
+    std::array<float, count> weight;  // [-] (mean noise / its reading's)^2, as the image says
   };
 
   /// Where a plane is fitted.
@@ -146,6 +147,9 @@ class SeenSurface {
       return std::abs(off) <= most * (1.0 + 0.1 * away / reach);
     }
   };
+  template <bool is_weighted>
+  [[nodiscard]] Plane plane_through(const Middle& middle, int cells, int step,
+                                    const Narrower* narrower) const noexcept;
   [[nodiscard]] Plane plane_about(const Middle& middle, int cells, int step,
                                   const Narrower* narrower = nullptr) const noexcept;
 
@@ -160,7 +164,14 @@ class SeenSurface {
   void start_cell(int u, int v) noexcept;
   [[nodiscard]] float read(int u, int v) const noexcept;
   bool find_level(const Aim& aim, const SightParameters& parameters) noexcept;
-  void update(std::size_t i, float z, const SightParameters& parameters) noexcept;
+  /// [m] What the image says of a cell's middle pixel; the mean if it says nothing.
+  [[nodiscard]] double noise_of(int u, int v) const noexcept;
+  /// Weighs a cell by that. @return [m] the spread of its readings
+  float weigh(int u, int v) noexcept;
+  /// [m] at 1 m, growing with the square of the distance: as the image says of `place`, or usual.
+  [[nodiscard]] double noise_at_1m(const Vec3& place,
+                                   const SightParameters& parameters) const noexcept;
+  void update(std::size_t i, float z, float spread, const SightParameters& parameters) noexcept;
   [[nodiscard]] bool flies(int u, int v, float z, const SightParameters& parameters) const noexcept;
   [[nodiscard]] bool is_of_body(int u, int v, float z) const noexcept;
   template <typename Ends>
@@ -193,16 +204,17 @@ class SeenSurface {
   double stamp_ = 0.0, interval_ = 0.0;              // [s]
   std::array<HeightSample, most_heights> levels_{};  // the newest first
   std::size_t frames_ = 0;
-  int rows_read_ = side;   // of the newest frame
-  int struck_ = 0;         // cells of these rows that something hides
-  bool slides_ = false;    // does a body slide over some of them?
-  bool slid_ = false;      // since the last tick
-  bool whole_ = false;     // since then
-  float newest_ = 0.0F;    // [m] level of the newest frame
-  float spread_ = 0.0F;    // [m] of cells about level and relief
-  double wobble_ = 0.0;    // [m] standard deviation of one frame's level
-  double level_ = 0.0;     // [m] as estimated
-  double velocity_ = 0.0;  // [m/s] of it
+  int rows_read_ = side;     // of the newest frame
+  int struck_ = 0;           // cells of these rows that something hides
+  bool slides_ = false;      // does a body slide over some of them?
+  bool slid_ = false;        // since the last tick
+  bool whole_ = false;       // since then
+  float newest_ = 0.0F;      // [m] level of the newest frame
+  float spread_ = 0.0F;      // [m] of cells about level and relief
+  double mean_noise_ = 1.0;  // [m] that the image says of these cells
+  double wobble_ = 0.0;      // [m] standard deviation of one frame's level
+  double level_ = 0.0;       // [m] as estimated
+  double velocity_ = 0.0;    // [m/s] of it
   // The blend from before the newest frame: it begins with the first tick after it.
   bool blend_due_ = false;
   double carried_ = 0.0;     // [m] the level shown before

@@ -21,6 +21,7 @@ PackedImage packed_image(const Cloud& image) {
   if (depth == nullptr) throw Error("cloud", "is not a depth image", "pack depth images alone");
   const Intrinsics& k = depth->intrinsics();
   PackedImage packed{.depth = encode_depth_rvl(k.width, k.height, depth->depth()), .materials = {}};
+  if (depth->noise()) packed.noise = encode_depth_rvl(k.width, k.height, *depth->noise());
   const MaterialMap* map = depth->materials().get();
   if (map == nullptr && !depth->has_brightness()) return packed;
   std::vector<std::uint16_t> pixels(depth->depth().size());
@@ -136,15 +137,27 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
   for (int i = 0; i < 12; ++i) exact.data.push_back(image.world_from_camera()(i / 4, i % 4));
   const bool has_materials = !packed_image.materials.empty();
   if (has_materials) materials(camera, stamp, image, packed_image);
-  if (has_materials || image.scale_unsure()) {
-    const Camera& written = cameras_[camera];
+  const bool has_noise = !packed_image.noise.empty();
+  Camera& written = cameras_[camera];
+  if (has_noise && packed_image.noise != written.noise) {
+    write(topics.noise, at,
+          compressed_depth(header, packed_image.noise,
+                           image.units_per_metre() * DepthImage::noise_steps, DepthPacking::rvl));
+    written.noise = packed_image.noise;
+    ++written.noise_images;
+  }
+  if (has_materials || image.scale_unsure() || has_noise) {
     exact.label += ",material_image,material_table";
     exact.data.push_back(has_materials ? static_cast<double>(written.material_images) : 0.0);
     exact.data.push_back(image.materials() ? static_cast<double>(written.tables) : 0.0);
   }
-  if (image.scale_unsure()) {
+  if (image.scale_unsure() || has_noise) {
     exact.label += ",scale_unsure";
-    exact.data.push_back(1.0);
+    exact.data.push_back(image.scale_unsure() ? 1.0 : 0.0);
+  }
+  if (has_noise) {
+    exact.label += ",noise_image";
+    exact.data.push_back(static_cast<double>(written.noise_images));
   }
 
   const ros::Header world{header.stamp, std::string(world_frame)};

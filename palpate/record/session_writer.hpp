@@ -20,6 +20,7 @@ struct PackedImage {
   /// A PNG of 16 bits: the label of each pixel's material, and its brightness in the upper eight,
   /// if that is felt. Empty where neither is known.
   std::vector<std::byte> materials;
+  std::vector<std::byte> noise{};  ///< as RVL: DepthImage::noise(); empty where it is not known
 };
 
 /// Packs a depth image for SessionWriter::frame: some 2 ms at 640x480. Any thread.
@@ -78,6 +79,8 @@ class SessionWriter {
     std::vector<std::byte> materials;
     std::shared_ptr<const MaterialTable> table;
     std::uint64_t material_images = 0, tables = 0;
+    std::vector<std::byte> noise;  // likewise
+    std::uint64_t noise_images = 0;
   };
 
   template <class Message>

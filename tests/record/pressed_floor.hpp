@@ -48,6 +48,14 @@ inline std::shared_ptr<const DepthImage> wavy_floor(int frame, bool distorted = 
   return std::make_shared<DepthImage>(rays, std::move(depth), 3000.0 / 1.1, pose);
 }
 
+/// Noise of such a floor [units of depth]: zero here and there, and ten times as much on one half.
+inline std::vector<float> wavy_noise(int frame) {
+  std::vector<float> noise(32 * 24);
+  for (std::size_t i = 0; i < noise.size(); ++i)
+    noise[i] = i % 7 == 0 ? 0.0F : (i % 32 < 16 ? 1.3F : 13.0F) + static_cast<float>(frame) / 3.0F;
+  return noise;
+}
+
 /// A loop on a clock of its own: a hand that presses into a floor which rises, parameters that
 /// change on the way, a clutch, faults and their reset, a second camera now and then.
 class PressedFloor {

@@ -19,7 +19,8 @@ namespace palpate::test {
 inline std::vector<ServoTick> record_press(SessionWriter& writer, const Parameters& parameters,
                                            int ticks, bool close = true,
                                            const std::string& method = "sight",
-                                           const std::shared_ptr<const ToolShape>& tool = {}) {
+                                           const std::shared_ptr<const ToolShape>& tool = {},
+                                           bool has_noise = false) {
   const auto place = [](int i) { return Vec3(0.03 + 1e-5 * i, -0.05, -0.01 - 4e-4 * i); };
   FakeDevice device;
   Cycle cycle(make_method(method, parameters, standard_methods(), tool), device,
@@ -30,7 +31,8 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
   for (int i = 0; i < ticks; ++i) {
     const double t = i * 1e-3;
     if (i % 33 == 0) {
-      const auto cloud = wavy_floor(i / 33);
+      const auto cloud = std::make_shared<DepthImage>(*wavy_floor(i / 33));
+      if (has_noise) cloud->set_noise(wavy_noise(i / 66));
       const double stamp = t - 1e-4 / 3.0;
       writer.frame(cycle.put_frame(cloud, stamp, t), stamp, 0, cloud);
     }

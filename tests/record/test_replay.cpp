@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <functional>
 #include <string>
 
@@ -64,6 +65,23 @@ TEST(ReplayOf, AToolGivesTheSameForcesAndTorquesBitForBit) {
   const ReplayReport report = replay(reader);
   EXPECT_TRUE(report.identical()) << text_of(report);
   EXPECT_EQ(report.ticks, 150U);
+}
+
+TEST(ReplayOf, FramesThatSayHowNoisyTheyAreGivesTheSameForcesBitForBit) {
+  for (const auto& tool : {std::shared_ptr<const ToolShape>(), make_tool("box:30x20x10mm", {})}) {
+    std::array<std::vector<ServoTick>, 2> ticks;
+    for (const bool has_noise : {false, true}) {
+      const TemporaryFolder folder;
+      SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
+      ticks[has_noise ? 1 : 0] = record_press(writer, {}, 300, true, "sight", tool, has_noise);
+      SessionReader reader(folder.path() / "bag");
+      const ReplayReport report = replay(reader);
+      EXPECT_TRUE(report.identical()) << text_of(report);
+    }
+    // The forces are others than without: a replay that lost the noise would differ.
+    EXPECT_GT(ticks[1].back().tick.force.norm(), 0.1);
+    EXPECT_NE(ticks[0].back().tick.force, ticks[1].back().tick.force);
+  }
 }
 
 // Records anew what was recorded, with some of it changed.

@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "palpate/io/sources/bag_camera.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/record/replay.hpp"
 
@@ -143,6 +144,38 @@ TEST(Session, KeepsEachBitOfADepthImage) {
     EXPECT_EQ(read->units_per_metre(), wrote.units_per_metre());
     EXPECT_EQ(read->world_from_camera().matrix(), wrote.world_from_camera().matrix());
   }
+}
+
+TEST(Session, KeepsEachBitOfTheNoiseAndWritesAnImageOfItWhereItChanges) {
+  const TemporaryFolder folder;
+  std::vector<std::shared_ptr<const DepthImage>> images;
+  for (int i = 0; i < 5; ++i) {
+    auto image = std::make_shared<DepthImage>(*wavy_floor(i));
+    if (i < 4) image->set_noise(test::wavy_noise(i / 2));
+    image->set_scale_unsure(i == 1);
+    images.push_back(std::move(image));
+  }
+  {
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
+    for (std::size_t i = 0; i < images.size(); ++i)
+      writer.frame(i, static_cast<double>(i), 0, images[i]);
+    writer.close();
+  }
+  SessionReader reader(folder.path() / "bag");
+  for (const std::size_t i : {3U, 0U, 1U, 2U, 4U}) {
+    const DepthImage* read = reader.seen(i).cloud->image();
+    ASSERT_NE(read, nullptr);
+    ASSERT_EQ(read->has_noise(), i < 4) << i;
+    if (i < 4) EXPECT_EQ(*read->noise(), *images[i]->noise()) << i;
+    EXPECT_EQ(read->scale_unsure(), i == 1);
+    EXPECT_FALSE(read->has_materials());
+  }
+  BagReader bag(folder.path() / "bag");
+  EXPECT_EQ(bag.places(CameraTopics(0).noise).size(), 2U);
+  // Whoever touches the bag's frames gets their noise too, and sees one camera.
+  EXPECT_EQ(BagCamera::topics_of(bag).size(), 1U);
+  const auto source = open_source("recording:" + (folder.path() / "bag").string());
+  EXPECT_TRUE(source->next()->cloud->image()->has_noise());
 }
 
 TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {

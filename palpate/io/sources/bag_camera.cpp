@@ -182,6 +182,7 @@ CameraTopics::CameraTopics(std::size_t number) {
   exact = "/" + camera + "/depth/exact";
   materials = "/" + camera + "/material/image/compressed";
   material_table = "/" + camera + "/material/table";
+  noise = "/" + camera + "/noise/image/compressed";
   optical_frame = camera + "_optical_frame";
 }
 
@@ -355,9 +356,9 @@ std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
   const BagReader::Place& place = exact_places_[number];
   const std::string name = bag_.name(exact_topic_, place);
   auto numbers = ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data;
-  // Materials, and behind them whether the scale was in doubt.
+  // Materials, and behind them whether the scale was in doubt, and the noise.
   const bool has_more =
-      (numbers.size() == size + 2 || numbers.size() == size + 3) && type_ != ros::PointCloud2::type;
+      numbers.size() >= size + 2 && numbers.size() <= size + 4 && type_ != ros::PointCloud2::type;
   if (numbers.size() != size && !has_more)
     throw Error(
         name,
@@ -416,29 +417,43 @@ Frame BagCamera::own_frame(std::size_t number, RosFrame seen) {
   if (numbers.size() > 14 && numbers[14] != 0.0)
     cloud->set_materials(materials(number, numbers[14], numbers[15]));
   if (numbers.size() > 16) cloud->set_scale_unsure(numbers[16] != 0.0);
+  if (numbers.size() > 17) cloud->set_noise(noise(number, numbers[17]));
   return Frame{numbers[0], std::move(cloud)};
 }
 
-// What was recorded of a frame's materials. The messages are counted from 1.
+// The messages are counted from 1.
+BagReader::Place BagCamera::changed(std::size_t number, const std::string& topic, double count) {
+  std::vector<BagReader::Place>& places = changed_places_[topic];
+  if (places.empty() && bag_.find(topic) != nullptr) places = bag_.places(topic);
+  if (!(count >= 1.0 && count <= static_cast<double>(places.size())))
+    throw Error(name(number), "has no message on " + topic, "the bag may be damaged");
+  return places[static_cast<std::size_t>(count) - 1];
+}
+
+DepthImage::Noise BagCamera::noise(std::size_t number, double image) {
+  if (noise_ && image == noise_image_) return noise_;
+  const std::string topic = topic_.substr(0, topic_.find('/', 1)) + "/noise/image/compressed";
+  const BagReader::Place place = changed(number, topic, image);
+  RosFrame read = ros_frame_of(ros::CompressedImage::type, bag_.read(place),
+                               DepthImage::noise_steps, bag_.name(topic, place));
+  noise_ = std::make_shared<const std::vector<std::uint16_t>>(std::move(read.depth));
+  noise_image_ = image;
+  return noise_;
+}
+
+// What was recorded of a frame's materials.
 std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, double image,
                                                         double table) {
   if (image == material_image_ && table == material_table_) return materials_;
   const std::string camera = topic_.substr(0, topic_.find('/', 1));
-  const auto message = [&](const std::string& topic, double count) {
-    std::vector<BagReader::Place>& places = material_places_[topic];
-    if (places.empty() && bag_.find(topic) != nullptr) places = bag_.places(topic);
-    if (!(count >= 1.0 && count <= static_cast<double>(places.size())))
-      throw Error(name(number), "has no message on " + topic, "the bag may be damaged");
-    return places[static_cast<std::size_t>(count) - 1];
-  };
   auto names = std::make_shared<MaterialTable>();
   if (table != 0.0) {
     const std::string topic = camera + "/material/table";
-    const BagReader::Place place = message(topic, table);
+    const BagReader::Place place = changed(number, topic, table);
     *names = materials_from_json(text(place, topic), bag_.name(topic, place));
   }
   const std::string topic = camera + "/material/image/compressed";
-  const BagReader::Place place = message(topic, image);
+  const BagReader::Place place = changed(number, topic, image);
   const std::string where = bag_.name(topic, place);
   const auto packed = ros::decode<ros::CompressedImage>(bag_.read(place), where);
   const DepthPng png = parse_depth_png(packed.data, where);

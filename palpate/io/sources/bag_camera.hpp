@@ -32,14 +32,17 @@ struct CameraTopics {
   /// Float64MultiArray, one for each image or cloud: values that standard messages lack or round.
   /// Depth: stamp [s], units per metre, world_from_camera (3 x 4, row by row); where something is
   /// known of the materials, which message of `materials` and which of `material_table` they are,
-  /// from 1, 0 for none.
+  /// from 1, 0 for none; 1 where the scale is in doubt; which message of `noise`. What is not known
+  /// is left out from the end.
   /// Points: stamp [s], an unused number, 1 if a viewpoint follows, the viewpoint [m].
   std::string exact;
   /// CompressedImage, "mono16; png": of each pixel the label of its material, and in the upper
   /// eight bits the brightness, if `format` ends with that. Written when it changes.
   std::string materials;
   std::string material_table;  ///< String: materials_json(), written when it changes
-  std::string optical_frame;   ///< in TF
+  /// CompressedImage, "16UC1; compressedDepth rvl": DepthImage::noise(), written when it changes.
+  std::string noise;
+  std::string optical_frame;  ///< in TF
 };
 
 /// CompressedImage::format of CameraTopics::materials.
@@ -101,6 +104,9 @@ class BagCamera {
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(double stamp) const;
   [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
   std::shared_ptr<const MaterialMap> materials(std::size_t number, double image, double table);
+  DepthImage::Noise noise(std::size_t number, double image);
+  /// The message of frame `number` on one of its camera's topics that are written when they change.
+  BagReader::Place changed(std::size_t number, const std::string& topic, double count);
   const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const RosFrame& image);
   [[nodiscard]] std::string text(const BagReader::Place& place, const std::string& topic) const;
   [[nodiscard]] double realsense_units(std::size_t number) const;
@@ -117,9 +123,11 @@ class BagCamera {
   std::string colour_note_;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
   OrganisedClouds organised_;
-  std::map<std::string, std::vector<BagReader::Place>> material_places_;
+  std::map<std::string, std::vector<BagReader::Place>> changed_places_;
   std::shared_ptr<const MaterialMap> materials_;        // of the frame read last
   double material_image_ = 0.0, material_table_ = 0.0;  // its messages
+  DepthImage::Noise noise_;                             // likewise
+  double noise_image_ = 0.0;
   std::string details_;
 };
 

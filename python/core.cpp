@@ -59,6 +59,7 @@ namespace {
 
 using namespace py::literals;
 using SharedRays = std::shared_ptr<const ViewingRays>;
+using Singles = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
 /// A pinhole camera, whose viewing rays are computed once for all of its frames.
 struct Camera {
@@ -105,7 +106,8 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
                                        double units_per_metre,
                                        const std::optional<Numbers>& world_from_camera,
                                        const std::optional<MaterialsOf>& materials,
-                                       const py::object& labels, const py::object& brightness) {
+                                       const py::object& labels, const py::object& brightness,
+                                       const std::optional<Singles>& noise) {
   const Intrinsics& k = camera.intrinsics();
   if (!py::isinstance<py::array_t<std::uint16_t>>(depth))
     throw py::type_error("depth: it has to be an array of uint16, not of " +
@@ -122,6 +124,10 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
       world_from_camera ? pose_of(*world_from_camera, "world_from_camera")
                         : Eigen::Isometry3d::Identity());
   image->set_materials(make_map(k, materials, labels, brightness));
+  if (noise) {
+    check_shape(*noise, "noise", {k.height, k.width}, image_shape);
+    image->set_noise({noise->data(), static_cast<std::size_t>(noise->size())});
+  }
   return image;
 }
 
@@ -343,13 +349,15 @@ void define_clouds(py::module_& m) {
           py::init(&make_image), py::arg("depth"), py::arg("camera"),
           py::arg("units_per_metre") = 1000.0, py::arg("world_from_camera") = py::none(),
           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
-          py::arg("brightness") = py::none(),
+          py::arg("brightness") = py::none(), py::arg("noise") = py::none(),
           "Depth along the optical axis, uint16 (height, width); 0 and 65535 are holes. The "
           "array is not copied: it is kept alive, and must not change meanwhile. The pose is a "
           "4x4 matrix, the camera's optical frame (x right, y down, z forward) in the world.\n\n"
           "`labels`, uint8 (height, width), says which of `materials` each pixel is: 0 none, 1 the "
-          "first. `brightness`, of the same shape, is what `relief` makes heights of. Both are "
-          "copied.")
+          "first. `brightness`, of the same shape, is what `relief` makes heights of. `noise`, of "
+          "the same shape and in the depth's own unit, is the standard deviation of each reading, "
+          "finite and 0 or more, also where depth has holes; it is kept to a 16th of the unit. "
+          "Without it the noise is that of the sensor type. All are copied.")
       .def_property_readonly(
           "depth",
           [](const py::object& self) {
@@ -362,6 +370,19 @@ void define_clouds(py::module_& m) {
           "uint16 (height, width), not to be written to: the image's own memory")
       .def_property_readonly("camera",
                              [](const DepthImage& image) { return Camera{image.shared_rays()}; })
+      .def_property_readonly(
+          "noise",
+          [](const DepthImage& image) -> std::optional<Singles> {
+            if (!image.noise()) return std::nullopt;
+            Singles noise({image.intrinsics().height, image.intrinsics().width});
+            std::transform(image.noise()->begin(), image.noise()->end(), noise.mutable_data(),
+                           [](std::uint16_t steps) {
+                             return static_cast<float>(steps / DepthImage::noise_steps);
+                           });
+            return noise;
+          },
+          "float32 (height, width), standard deviations in the depth's own unit, as they are kept; "
+          "None: not known")
       .def_property_readonly("units_per_metre", &DepthImage::units_per_metre)
       .def_property_readonly(
           "world_from_camera",
@@ -470,15 +491,17 @@ void define_renderer(py::module_& m) {
           [](Renderer& self, const py::array& depth, const Camera& camera, double stamp,
              const std::optional<Numbers>& world_from_camera, double units_per_metre,
              const std::optional<MaterialsOf>& materials, const py::object& labels,
-             const py::object& brightness, std::size_t number) {
+             const py::object& brightness, const std::optional<Singles>& noise,
+             std::size_t number) {
             self.frame(make_image(depth, camera, units_per_metre, world_from_camera, materials,
-                                  labels, brightness),
+                                  labels, brightness, noise),
                        stamp, number);
           },
           py::arg("depth"), py::kw_only(), py::arg("camera"), py::arg("stamp"),
           py::arg("world_from_camera") = py::none(), py::arg("units_per_metre") = 1000.0,
           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
-          py::arg("brightness") = py::none(), py::arg("camera_number") = 0,
+          py::arg("brightness") = py::none(), py::arg("noise") = py::none(),
+          py::arg("camera_number") = 0,
           "The same from a depth image, uint16 (height, width), without a copy; the rest as\n"
           "DepthImage has it.")
       .def(

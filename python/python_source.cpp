@@ -21,6 +21,7 @@ std::shared_ptr<const Cloud> without_python(std::shared_ptr<Cloud> cloud) {
       image->shared_rays(), std::vector<std::uint16_t>(depth.begin(), depth.end()),
       image->units_per_metre(), image->world_from_camera(), image->brightness());
   copy->set_materials(image->materials());
+  copy->set_noise(image->noise());
   return copy;
 }
 

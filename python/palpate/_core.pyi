@@ -64,8 +64,10 @@ class DepthImage(Cloud):
                  world_from_camera: Optional[ArrayLike] = None,
                  materials: Optional[Materials] = None,
                  labels: Optional[NDArray[numpy.uint8]] = None,
-                 brightness: Optional[NDArray[numpy.uint8]] = None) -> None: ...
+                 brightness: Optional[NDArray[numpy.uint8]] = None,
+                 noise: Optional[ArrayLike] = None) -> None: ...
     depth: Final[NDArray[numpy.uint16]]
+    noise: Final[Optional[NDArray[numpy.float32]]]
     camera: Final[Camera]
     units_per_metre: Final[float]
     world_from_camera: Final[NDArray[numpy.float64]]
@@ -111,7 +113,8 @@ class Renderer:
               world_from_camera: Optional[ArrayLike] = None,
               units_per_metre: float = 1000.0, materials: Optional[Materials] = None,
               labels: Optional[NDArray[numpy.uint8]] = None,
-              brightness: Optional[NDArray[numpy.uint8]] = None) -> None: ...
+              brightness: Optional[NDArray[numpy.uint8]] = None,
+              noise: Optional[ArrayLike] = None) -> None: ...
     @overload
     def frame(self, points: ArrayLike, *, stamp: float,
               viewpoint: Optional[ArrayLike] = None) -> None: ...

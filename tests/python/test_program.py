@@ -172,6 +172,28 @@ class Session(unittest.TestCase):
             self.assertEqual(palpate.read_session(bag).tobytes(), ticks.tobytes())
             self.assertEqual(len(list(palpate.Source(f"recording:{bag}"))), 30)
 
+    def test_records_the_noise_that_an_object_knows(self):
+        class Knows:
+            def __iter__(self):
+                for i, frame in enumerate(palpate.Source(CAMERA)):
+                    noise = numpy.where(frame.depth % 3 == 0, 30.0, 3.0) + i // 10
+                    yield palpate.DepthImage(frame.depth, frame.camera, frame.units_per_metre,
+                                             frame.world_from_camera, noise=noise), frame.stamp
+
+        with tempfile.TemporaryDirectory() as folder:
+            bag = os.path.join(folder, "session")
+            with palpate.Session(Knows(), free_running=True, stroke_time=2.0,
+                                 record=bag) as session:
+                session.run(2.0)
+                self.assertGreater(numpy.abs(session.ticks()["force"]).max(), 0.1)
+            program = [os.environ["PALPATE_PROGRAM"], "replay", bag]
+            self.assertIn("asked: identical", subprocess.run(program, check=True, text=True,
+                                                             stdout=subprocess.PIPE).stdout)
+            read = [frame.cloud.noise for frame in palpate.Source(f"recording:{bag}")]
+            self.assertGreater(len(read), 50)
+            wrote = [image.noise for (image, _), _ in zip(Knows(), read)]
+            numpy.testing.assert_array_equal(read, wrote)
+
     def test_feels_fixtures_in_free_air(self):
         wall = ("[[fixture]]\nname = \"all\"\nshape = \"sphere\"\n"
                 "pose = [0, 0, 0.4, 0, 0, 0, 1]\nradius = 0.05")

@@ -179,6 +179,36 @@ class Renderer(unittest.TestCase):
         tick = touch.tick((numpy.nan, 0, 0), 0.0)
         self.assertEqual(tuple(tick.force), (0, 0, 0))
 
+    def test_leans_on_the_pixels_that_are_said_to_be_quiet(self):
+        near = palpate.Camera(64, 48, 300.0, 300.0, 31.5, 23.5)
+        half = numpy.tile(numpy.where(numpy.arange(64) < 32, 0.5, 5.0), (48, 1))  # [mm]
+
+        def error(**noise):
+            random, touch, off = numpy.random.default_rng(1), palpate.Renderer(), []
+            for i in range(150):
+                depth = (wall(500) + random.normal(0, half)).round().astype(numpy.uint16)
+                touch.frame(depth, camera=near, stamp=i / 30, **noise)
+                hips = numpy.tile((0, 0, min(0.45 + 0.005 * i, 0.501)), (33, 1))
+                proxy = touch.ticks(hips, i / 30 + 1e-3 * numpy.arange(33))["proxy"]
+                off.append(proxy[-1, 2] - 0.495)  # r_c in front of it
+            return numpy.sqrt(numpy.mean(numpy.square(off[30:])))
+
+        untold, told = error(), error(noise=half)
+        self.assertLess(told, 0.5 * untold)
+
+    def test_keeps_the_noise_of_an_image_and_refuses_what_is_none(self):
+        noise = numpy.arange(48 * 64).reshape(48, 64) / 16
+        for kind in (numpy.float64, numpy.float32):
+            image = palpate.DepthImage(wall(), CAMERA, noise=noise.astype(kind))
+            numpy.testing.assert_array_equal(image.noise, noise)
+        self.assertIsNone(palpate.DepthImage(wall(), CAMERA).noise)
+        for value, says in ((numpy.nan, "it is nan"), (numpy.inf, "it is inf"), (-1, "it is -1")):
+            wrong = noise.copy()
+            wrong[3, 7] = value
+            with self.assertRaisesRegex(palpate.Error,
+                                        f"noise: {says}.* at row 3, column 7; give a standard"):
+                palpate.DepthImage(wall(), CAMERA, noise=wrong)
+
     def test_names_the_shape_that_is_needed_and_the_one_that_was_given(self):
         zeros = numpy.zeros
         touch, ones = self.touch(), numpy.ones((48, 64), numpy.uint8)
@@ -228,6 +258,10 @@ class Renderer(unittest.TestCase):
                  "labels", "(64, 48)", "labels.T"),
                 (lambda: palpate.DepthImage(wall(), CAMERA, brightness=ones[1:]),
                  "brightness", "(47, 64)", "(48, 64)"),
+                (lambda: palpate.DepthImage(wall(), CAMERA, noise=ones.T), "noise", "(64, 48)",
+                 "noise.T"),
+                (lambda: touch.frame(wall(), camera=CAMERA, stamp=0.0, noise=2.0), "noise", "()",
+                 "(48, 64)"),
                 (lambda: palpate.trace("synthetic:plane", zeros((9, 3))), "path", "(9, 3)",
                  "(n, 4)"),
                 (lambda: session(world_from_device=zeros(16)), "world_from_device", "(16,)",

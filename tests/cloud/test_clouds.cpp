@@ -612,7 +612,9 @@ TEST(DepthImage, SaysHowNoisyTheReadingIsThatSawAPlace) {
         // No reading is better than rounding to its unit, and a hole has none.
         const double truth = std::max(0.25e-3 * (40 * v + u), 1e-3 / std::sqrt(12.0));
         EXPECT_NEAR(said, place ? truth : usual, 1e-12) << u << ' ' << v;
-        if (place) EXPECT_EQ(image.noise_at(*place, usual), said) << u << ' ' << v;
+        if (place) {
+          EXPECT_EQ(image.noise_at(*place, usual), said) << u << ' ' << v;
+        }
       }
     }
     EXPECT_EQ(image.noise_at(pose * Vec3(0, 0, -1), usual), usual) << "behind the camera";

@@ -166,7 +166,9 @@ TEST(Session, KeepsEachBitOfTheNoiseAndWritesAnImageOfItWhereItChanges) {
     const DepthImage* read = reader.seen(i).cloud->image();
     ASSERT_NE(read, nullptr);
     ASSERT_EQ(read->has_noise(), i < 4) << i;
-    if (i < 4) EXPECT_EQ(*read->noise(), *images[i]->noise()) << i;
+    if (i < 4) {
+      EXPECT_EQ(*read->noise(), *images[i]->noise()) << i;
+    }
     EXPECT_EQ(read->scale_unsure(), i == 1);
     EXPECT_FALSE(read->has_materials());
   }

@@ -22,10 +22,14 @@ constexpr float most_relief = 128.0F;    // frames in a cell's mean
 constexpr double slow_intervals = 4.0;
 constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
-constexpr float flying_spreads = 2.0F;   // [-] that a reading beside an occluder may be nearer
-constexpr int edge = 2;                  // [cells] from an occluder to where readings may be so
-constexpr float sliding_spreads = 3.0F;  // [-] beside `deepest`, by which a sliding body is nearer
-constexpr float edge_spreads = 4.0F;     // [-] by which it is at its foot, in so many cells
+constexpr float flying_spreads = 2.0F;  // [-] that a reading beside an occluder may be nearer
+constexpr int edge = 2;                 // [cells] from an occluder to where readings may be so
+// [-] beside `deepest`, by which a body is nearer that begins to slide; by which it is while it
+// goes on; and [frames] without it, after which it begins again.
+constexpr float sliding_spreads = 3.0F;
+constexpr float going_spreads = 2.0F;
+constexpr double going_frames = 3.5;
+constexpr float edge_spreads = 4.0F;  // [-] by which it is at its foot, in so many cells
 constexpr int foot = 6;
 constexpr int least_slid = 24;  // cells: two along a frame's way, twelve along an edge
 // Cells that are nearer by more than so many times what may strike a surface: more are an occluder.
@@ -375,13 +379,16 @@ void SeenSurface::slide() noexcept {
   if (!slides_) return;
   slides_ = false;
   Cells& all = cells_[0];
-  const float high = static_cast<float>(deepest) + sliding_spreads * spread_;
+  const bool goes_on = stamp_ - slid_at_ < going_frames * interval_;
+  const float high =
+      static_cast<float>(deepest) + (goes_on ? going_spreads : sliding_spreads) * spread_;
   const auto is_high = [&](int u, int v) {
     return has(u, v) && all.smooth[index(u, v)] - all.slides[index(u, v)] > high;
   };
   int size = 0;
   for (std::size_t i = 0; i < count; ++i) size += all.smooth[i] - all.slides[i] > high ? 1 : 0;
   slid_ = size >= least_slid && struck_ <= most_struck;
+  if (slid_) slid_at_ = stamp_;
   for (int v = v_; v < v_ + side; ++v) {
     for (int u = u_; u < u_ + side; ++u) {
       float& slides = all.slides[index(u, v)];
@@ -441,6 +448,7 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
   if (!goes_on) {
     frames_ = 0;
     slides_ = false;
+    slid_at_ = -std::numeric_limits<double>::infinity();
     newest_ = static_cast<float>(in_camera(aim.place).z());
     spread_ = 0.0F;
     const double usual = noise_at_1m(aim.place, parameters);

@@ -221,7 +221,8 @@ class SeenSurface {
   double offset_ = 0.0;      // [m] of the level, at the blend's start
   double blend_time_ = 0.0;  // [s]
   double blend_start_ = -std::numeric_limits<double>::infinity();
-  double t_ = -std::numeric_limits<double>::infinity();  // [s] of the last tick
+  double slid_at_ = -std::numeric_limits<double>::infinity();  // [s] the last frame that slid_
+  double t_ = -std::numeric_limits<double>::infinity();        // [s] of the last tick
 };
 
 }  // namespace palpate

@@ -348,14 +348,14 @@ class Simulation::Implementation {
     const Vector6 velocity = jacobian * Eigen::Map<const Vector6>(d.qvel);
     const Vec3 tip_velocity = velocity.head<3>();
     const Vec3 tip_position = tip();
-    const Rotation tip_turn = this->tip_turn();
+    const Rotation turned = tip_turn();
 
     const bool led = commanded_ && d.time - commanded_at_ < command_timeout;
     if (led != led_ && !led) {
       // Where the reference comes to rest from its velocity without overshoot.
       goal_ = tip_position + limited(tip_velocity, setup_.max_speed) / reference_rate;
       goal_velocity_.setZero();
-      goal_turn_ = tip_turn;
+      goal_turn_ = turned;
     }
     led_ = led;
     const double spring = led ? stiffness : hold_stiffness;
@@ -387,10 +387,10 @@ class Simulation::Implementation {
         limited(reference_rate * (reference_rate * left - 2.0 * old_spin), max_turning);
     reference_spin_ = limited(old_spin + turning * dt, max_spin);
     reference_turn_ = unit(product(rotation_by(reference_spin_ * dt), reference_turn_));
-    Vec3 turn = rotation_vector(between(reference_turn_, tip_turn));
+    Vec3 turn = rotation_vector(between(reference_turn_, turned));
     if (turn.norm() > longest_turn) {
       turn = limited(turn, longest_turn);
-      reference_turn_ = unit(product(rotation_by(turn), tip_turn));
+      reference_turn_ = unit(product(rotation_by(turn), turned));
       reference_spin_ = velocity.tail<3>();
     }
     Vector6 feed_forward;
@@ -411,7 +411,7 @@ class Simulation::Implementation {
       d.ctrl[i] = std::clamp(torque[i], -most, most);
     }
     tip_velocity_ = tip_velocity;
-    last_tip_ = {tip_position, tip_turn};
+    last_tip_ = {tip_position, turned};
   }
 
   struct PlateState {

@@ -71,8 +71,8 @@ struct Truth {
 ///
 /// The arm is led by an impedance: its tip is drawn to a reference that follows the commands as a
 /// critically damped second-order system does, limited in speed, and that never leads the tip by
-/// more than what makes `max_force`. Its orientation follows as that of a SimulatedTurn. 100 ms
-/// after the last command the tip stops, and is held by a soft spring.
+/// more than what makes `max_force`; its orientation follows in the same way, at 2 rad/s at most.
+/// 100 ms after the last command the tip stops, and is held by a soft spring.
 class Simulation {
  public:
   static constexpr double command_timeout = 0.1;  ///< [s]

@@ -16,6 +16,7 @@
 #include "tests/servo/fake_device.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
+#include "tests/support/patient.hpp"
 
 namespace palpate {
 namespace test_device_loop {
@@ -201,10 +202,7 @@ TEST(ServoLoop, DisablesADeviceWithAForceLongBeforeTheWatchTime) {
   Hang hang;
   FakeDevice device;
   ServoSettings settings;
-  settings.safety.fade_age = 5.0;
-  settings.safety.lost_age = 10.0;
-  settings.safety.late_intervals = 100.0;
-  settings.safety.stall_time = 0.1;
+  settings.safety = test::patient();
   ServoLoop loop(std::make_unique<HangingMethod>(hang, 1.0), device, settings, {.watch_time = 1.0});
   loop.start();
   bool in_time = false;

@@ -30,6 +30,7 @@
 #include "tests/session/fakes.hpp"
 #include "tests/support/comes_true.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/patient.hpp"
 #include "tests/support/sanitized.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -380,10 +381,7 @@ SessionOptions live_with_two(const std::shared_ptr<LiveHand::Told>& one,
   options.open_cameras.push_back(living_wall());
   options.open_devices[0] = std::make_unique<LiveHand>(one);
   options.open_devices.push_back(std::make_unique<LiveHand>(other));
-  options.safety.fade_age = 5.0;
-  options.safety.lost_age = 10.0;
-  options.safety.late_intervals = 100.0;
-  options.safety.stall_time = 0.1;
+  options.safety = test::patient();
   return options;
 }
 

@@ -174,8 +174,9 @@ class Recording final : public Source {
 
 }  // namespace
 
-CameraTopics::CameraTopics(std::size_t number) {
-  const std::string camera = "camera_" + std::to_string(number);
+CameraTopics::CameraTopics(std::size_t number) : CameraTopics("camera_" + std::to_string(number)) {}
+
+CameraTopics::CameraTopics(const std::string& camera) {
   depth = "/" + camera + "/depth/image_raw/compressedDepth";
   camera_info = "/" + camera + "/depth/camera_info";
   points = "/" + camera + "/depth/points";
@@ -432,7 +433,7 @@ BagReader::Place BagCamera::changed(std::size_t number, const std::string& topic
 
 DepthImage::Noise BagCamera::noise(std::size_t number, double image) {
   if (noise_ && image == noise_image_) return noise_;
-  const std::string topic = topic_.substr(0, topic_.find('/', 1)) + "/noise/image/compressed";
+  const std::string topic = topics().noise;
   const BagReader::Place place = changed(number, topic, image);
   RosFrame read = ros_frame_of(ros::CompressedImage::type, bag_.read(place),
                                DepthImage::noise_steps, bag_.name(topic, place));
@@ -445,14 +446,14 @@ DepthImage::Noise BagCamera::noise(std::size_t number, double image) {
 std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, double image,
                                                         double table) {
   if (image == material_image_ && table == material_table_) return materials_;
-  const std::string camera = topic_.substr(0, topic_.find('/', 1));
+  const CameraTopics topics = this->topics();
   auto names = std::make_shared<MaterialTable>();
   if (table != 0.0) {
-    const std::string topic = camera + "/material/table";
+    const std::string& topic = topics.material_table;
     const BagReader::Place place = changed(number, topic, table);
     *names = materials_from_json(text(place, topic), bag_.name(topic, place));
   }
-  const std::string topic = camera + "/material/image/compressed";
+  const std::string& topic = topics.materials;
   const BagReader::Place place = changed(number, topic, image);
   const std::string where = bag_.name(topic, place);
   const auto packed = ros::decode<ros::CompressedImage>(bag_.read(place), where);

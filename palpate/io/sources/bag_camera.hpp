@@ -25,6 +25,7 @@ class BagColour;
 /// Names of the topics of camera `number`, from 0, in a recording of palpate's own.
 struct CameraTopics {
   explicit CameraTopics(std::size_t number);
+  explicit CameraTopics(const std::string& camera);  ///< by its name, such as `camera_0`
 
   std::string depth;  ///< CompressedImage, "16UC1; compressedDepth png": the camera's own bits
   std::string camera_info;  ///< CameraInfo, one for each depth image
@@ -105,6 +106,9 @@ class BagCamera {
   [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
   std::shared_ptr<const MaterialMap> materials(std::size_t number, double image, double table);
   DepthImage::Noise noise(std::size_t number, double image);
+  [[nodiscard]] CameraTopics topics() const {
+    return CameraTopics(topic_.substr(1, topic_.find('/', 1) - 1));
+  }
   /// The message of frame `number` on one of its camera's topics that are written when they change.
   BagReader::Place changed(std::size_t number, const std::string& topic, double count);
   const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const RosFrame& image);

@@ -267,7 +267,7 @@ BodyOptions body_options(const Uri& uri, bool y_up, bool in_metres) {
   // The shortest turn of it onto z. Eigen's FromTwoVectors would instantiate a singular value
   // decomposition.
   const Vec3 across = axis.cross(Vec3::UnitZ());
-  const double twice = std::sqrt(2.0 * (1.0 + axis.z()));  // cosine of half the angle
+  const double twice = std::sqrt(2.0 * (1.0 + axis.z()));  // the cosine of half the angle
   options.turn = (twice > 0.0 ? Eigen::Quaterniond(0.5 * twice, across.x() / twice,
                                                    across.y() / twice, across.z() / twice)
                               : Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0))  // of -z, round x

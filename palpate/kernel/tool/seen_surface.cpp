@@ -79,11 +79,6 @@ float strike(const SightParameters& parameters) {
   return static_cast<float>(farthest_strike * parameters.detail);
 }
 
-// [m] A reading's noise at 1 m.
-double usual_at_1m(const SightParameters& parameters) {
-  return parameters.usual_noise > 0.0 ? parameters.usual_noise : SightParameters::unknown_noise;
-}
-
 // (4), block by block: compilers make vector code of all but the look-up.
 PALPATE_VECTORISED
 void raise(const SeenSurface::View& view, const PointArrays& points, float* gap) {
@@ -217,7 +212,7 @@ double SeenSurface::noise_at_1m(const Vec3& place,
                                 const SightParameters& parameters) const noexcept {
   const double said = image_->noise_at(place, 0.0);
   const double z = std::max(in_camera(place).z(), nearest_camera);
-  return said > 0.0 ? said / (z * z) : usual_at_1m(parameters);
+  return said > 0.0 ? said / (z * z) : parameters.usual_noise_at(1.0);
 }
 
 void SeenSurface::start_cell(int u, int v) noexcept {
@@ -317,7 +312,8 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
   if (frames_ >= 2) {
     const double bend = newest_ - 2.0 * levels_[0].height + levels_[1].height;
     // An image that is too sure of itself must not make the level so.
-    const double usual = std::max(noise_at_1m(aim.place, parameters), usual_at_1m(parameters));
+    const double usual =
+        std::max(noise_at_1m(aim.place, parameters), parameters.usual_noise_at(1.0));
     const double size_of = std::min(bend * bend / 6.0, p.squaredNorm() * usual * usual);
     wobble_ = std::sqrt((1.0 - memory) * wobble_ * wobble_ + memory * size_of);
   }

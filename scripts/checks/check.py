@@ -52,6 +52,11 @@ CORE_FORBIDS = {
     "stop_token", "thread",
 }
 
+# A reader of the paper follows these: no function is longer [lines].
+SHORT = re.compile(r"^palpate/kernel/(core|sight|feel|methods|cloud)/.*\.cpp$")
+LONGEST = 60
+BODY = re.compile(r"\{\n((?:[ #][^\n]*\n|\n)*)\}\n")
+
 # The field set judges what was made with the lab's own scenes and sensors, so it must not reach
 # their code, not even by a header of another room (docs/field.md).
 FIELD = re.compile(r"^lab/(field/.*|experiments/field)\.[ch]pp$")
@@ -148,7 +153,14 @@ def check_rooms(root):
             for other in known:
                 if other != room and other not in KNOWS[room]:
                     faults.append(f"{path}:{number}: {room} must not know {other}")
-    return faults + check_field(root) + check_gate(root)
+    return faults + check_field(root) + check_gate(root) + check_length(root)
+
+
+def check_length(root):
+    """Functions that are too long to be followed."""
+    return [f"{path}:{text[:body.start()].count(chr(10)) + 1}: over {LONGEST} lines in a function"
+            for path in files(root, SHORT) for text in [(root / path).read_text(encoding="utf-8")]
+            for body in BODY.finditer(text) if body.group(1).count("\n") > LONGEST]
 
 
 def check_gate(root):

@@ -105,6 +105,14 @@ class Rooms(Tree):
                           "palpate/servo/a.cpp:2: writes to a device past "
                           "palpate/servo/last_gate.hpp"])
 
+    def test_a_long_function_is_found(self):
+        for lines in (60, 61):
+            body = "  ++i;\n" * lines
+            self.write(f"palpate/kernel/sight/a{lines}.cpp",
+                       f"{SPDX}namespace palpate {{\nvoid f(int i) {{\n{body}}}\n}}\n")
+        self.assertEqual(check.check_rooms(self.root),
+                         ["palpate/kernel/sight/a61.cpp:3: over 60 lines in a function"])
+
     def test_a_room_nobody_planned_is_found(self):
         self.include("palpate/kitchen/a.cpp", "<cmath>")
         self.assertEqual(len(check.check_rooms(self.root)), 1)

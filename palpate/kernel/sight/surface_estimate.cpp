@@ -26,8 +26,6 @@ constexpr double narrowest_cell = 0.9;  // [detail]
 constexpr double least_radius = 3.0;
 // Discs of coarse images grow at least by this from rung to rung; fine ones' by 1.57 to 1.7.
 constexpr double least_growth = 1.25;
-// Residuals this small are no structure, whatever the noise [detail].
-constexpr double structure_floor = 0.01;
 // Noise may grow by this much at once, however little there was [detail].
 constexpr double unnoticed_noise = 0.01;
 // Less noise is not told from rounding: a standard deviation [detail].
@@ -129,7 +127,7 @@ void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
   if (detail() == before) return;
   set_spacing(0.0);
   forget_frames();
-  for (Cells& past : cells_) past.full = false;
+  fit_test_.forget();
 }
 
 double SurfaceEstimate::height_sd() const noexcept { return std::sqrt(variance(mover_)); }
@@ -176,7 +174,7 @@ void SurfaceEstimate::set_spacing(double spacing) noexcept {
   for (std::size_t j = 0; j < rungs; ++j, least *= least_growth) {
     radii_[j] = std::max(narrowest_discs[j] * detail(), least);
   }
-  cell_size_ = narrowest_cell * detail() * coarseness();
+  fit_test_.set_cell_size(narrowest_cell * detail() * coarseness());
 }
 
 std::size_t SurfaceEstimate::most_rungs() const noexcept {
@@ -233,7 +231,7 @@ bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up
   frame_ = LocalFrame::about(foot, up);
   surface_ = {};
   count_ = 0;
-  for (Cells& past : cells_) past.full = false;
+  fit_test_.forget();
   stop();
   jumped_ = false;
   smooth_ = false;
@@ -325,60 +323,102 @@ double SurfaceEstimate::weigh(const Cloud& cloud, double usual) noexcept {
   return sum / static_cast<double>(points_.size);
 }
 
+// Shifts the expected surface to the points near `foot` and sets `cut`, as `recentre`. Without an
+// estimate to start from, the shape is found by iterating the fit. False if there are too few.
+bool SurfaceEstimate::find_surface(const Vec2& foot, double wide, double& cut) noexcept {
+  if (count_ > 0) return recentre(foot, wide, cut);
+  for (int i = 0; i < 3; ++i) {
+    if (!recentre(foot, wide, cut)) return false;
+    const Moments moments =
+        moments_of({foot, 0.0, radii_[1], std::max(cut, 0.4 * detail())}, is_weighted_);
+    if (moments.xy[0] < 6.0) return false;
+    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0], unit());
+    surface_.c += correction.c;
+  }
+  return true;
+}
+
+// Begins the evidence of a new frame.
+void SurfaceEstimate::start_evidence(bool jumped) noexcept {
+  // Heights from before a jump belong to another surface, unless the next frame's jump says that
+  // it was a motion.
+  const bool goes_on = jumped && jumped_;
+  jumped_ = jumped;
+  if (count_ == 0 || (jumped && !goes_on)) settled_ = 0;
+  if (settled_ == 0) rested_ = 0;
+  settled_ += goes_on && settled_ == 1 ? 2 : 1;
+  newest_ = (newest_ + 1) % history;
+  count_ = std::min(count_ + 1, most_frames());
+  evidence(0).camera = camera_;
+  is_known_.fill(false);
+  for (std::size_t i = 0; i < count_; ++i) is_known_[evidence(i).camera] = true;
+  cameras_ = static_cast<std::size_t>(std::count(is_known_.begin(), is_known_.end(), true));
+}
+
+Moments SurfaceEstimate::moments_of(const Disc& disc, bool is_weighted) const noexcept {
+  return disc_moments(patch_, frame_, surface_, disc, unit(),
+                      is_weighted ? weights_.data() : nullptr);
+}
+
+// Adds the ring that makes disc j of the next narrower one.
+void SurfaceEstimate::add_ring(std::size_t j, const Vec2& foot, double cut) noexcept {
+  Evidence& now = evidence(0);
+  const Disc disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut};
+  Moments moments = moments_of(disc, is_weighted_);
+  // Where points are, and how many, does not depend on their noise.
+  const Moments all = is_weighted_ ? moments_of(disc, false) : moments;
+  now.extent[j] = all.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
+  if (j == 0) middle_ = Eigen::Map<const Vec5>(&all.xy[1]) / std::max(all.xy[0], 1e-9);
+  moments.raise(surface_, unit());
+  if (j > 0) moments.add(now.disc[j - 1]);
+  now.disc[j] = moments;
+}
+
+// Where there is noise to average away, looks farther.
+// @param reading  [m] noise of a point that weighs 1
+void SurfaceEstimate::add_wide_rings(const Cloud& cloud, const Vec3& place, const Vec2& foot,
+                                     double wide, double reading, double cut) noexcept {
+  Evidence& now = evidence(0);
+  const Scatter& inner = scatter_[now.camera][1];
+  const bool noisy =
+      inner.samples >= 1.0 ? inner.variance > squared(4e-3 * detail()) : spread_ > 0.02 * detail();
+  const std::size_t most = most_rungs();
+  if (!noisy || most <= inner_rungs) return;
+  const double widest = radii_[most - 1];
+  gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
+  points_.take(patch_, frame_);
+  weigh(cloud, reading);
+  // Noise that is common to the inner disc is not common to the wide ones: their outliers are
+  // judged by their own median and deviation.
+  if (const std::optional<Residuals> far = residuals(foot, widest, wide)) {
+    surface_.c[0] += far->median;
+    cut = std::clamp(6.0 * far->deviation, cut, wide);
+  }
+  for (std::size_t j = inner_rungs; j < most; ++j) add_ring(j, foot, cut);
+  now.rungs = most;
+}
+
 // Measures the surface around `foot` in the newest frame, and estimates anew from all frames.
 bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& look,
                               bool new_frame) noexcept {
-  const double wide = look.gate;
   const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
-  const double deep = wide + 2.0 * radii_[1];
+  const double deep = look.gate + 2.0 * radii_[1];
   gather(cloud, Beam{place, radii_[1] * 1.2, deep, frame_.up}, inner_points, patch_);
   points_.take(patch_, frame_);
   const bool first = count_ == 0;
   const std::size_t camera = new_frame || first ? camera_ : this->camera();
   const double usual = usual_noise(camera);
   const double information = weigh(cloud, usual);
-  // [m] of a point that weighs 1: the inner disc's points weigh that in the mean
-  const double reading = usual / std::sqrt(information);
+  // The inner disc's points weigh 1 in the mean
   if (is_weighted_)
     for (float& weight : weights_) weight /= static_cast<float>(information);
-  const auto moments_of = [this](const Disc& disc, bool is_weighted) {
-    return disc_moments(patch_, frame_, surface_, disc, unit(),
-                        is_weighted ? weights_.data() : nullptr);
-  };
   const Quadric before = surface_;
   double cut = 0.0;
-  // Without an estimate to start from, the shape is found by iterating the fit.
-  for (int i = 0; i < (first ? 3 : 1); ++i) {
-    if (!recentre(foot, wide, cut)) {
-      surface_ = before;
-      return false;
-    }
-    if (!first) break;
-    const Moments moments =
-        moments_of({foot, 0.0, radii_[1], std::max(cut, 0.4 * detail())}, is_weighted_);
-    if (moments.xy[0] < 6.0) {
-      surface_ = before;
-      return false;
-    }
-    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0], unit());
-    surface_.c += correction.c;
+  if (!find_surface(foot, look.gate, cut)) {
+    surface_ = before;
+    return false;
   }
-
-  if (new_frame || count_ == 0) {
-    // Heights from before a jump belong to another surface, unless the next frame's jump says that
-    // it was a motion.
-    const bool goes_on = look.jumped && jumped_;
-    jumped_ = look.jumped;
-    if (count_ == 0 || (look.jumped && !goes_on)) settled_ = 0;
-    if (settled_ == 0) rested_ = 0;
-    settled_ += goes_on && settled_ == 1 ? 2 : 1;
-    newest_ = (newest_ + 1) % history;
-    count_ = std::min(count_ + 1, most_frames());
-    evidence(0).camera = camera_;
-    is_known_.fill(false);
-    for (std::size_t i = 0; i < count_; ++i) is_known_[evidence(i).camera] = true;
-    cameras_ = static_cast<std::size_t>(std::count(is_known_.begin(), is_known_.end(), true));
-  }
+  if (new_frame || first) start_evidence(look.jumped);
   Evidence& now = evidence(0);
   now.stamp = stamp_;
   now.centre = foot;
@@ -386,41 +426,10 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   now.lost = 0;
   now.information = information;
   noisier_[camera] = 1.0 / std::sqrt(information);
-  const auto add_ring = [&](std::size_t j) {
-    const Disc disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut};
-    Moments moments = moments_of(disc, is_weighted_);
-    // Where points are, and how many, does not depend on their noise.
-    const Moments all = is_weighted_ ? moments_of(disc, false) : moments;
-    now.extent[j] = all.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
-    if (j == 0) middle_ = Eigen::Map<const Vec5>(&all.xy[1]) / std::max(all.xy[0], 1e-9);
-    moments.raise(surface_, unit());
-    if (j > 0) moments.add(now.disc[j - 1]);
-    now.disc[j] = moments;
-  };
-  for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j);
+  for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j, foot, cut);
   now.rungs = inner_rungs;
-
-  look_at_cells(foot, look, new_frame);
-
-  // Where there is noise to average away, look farther.
-  const Scatter& inner = scatter_[now.camera][1];
-  const bool noisy =
-      inner.samples >= 1.0 ? inner.variance > squared(4e-3 * detail()) : spread_ > 0.02 * detail();
-  const std::size_t most = most_rungs();
-  if (noisy && most > inner_rungs) {
-    const double widest = radii_[most - 1];
-    gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
-    points_.take(patch_, frame_);
-    weigh(cloud, reading);
-    // Noise that is common to the inner disc is not common to the wide ones: their outliers are
-    // judged by their own median and deviation.
-    if (const std::optional<Residuals> far = residuals(foot, widest, wide)) {
-      surface_.c[0] += far->median;
-      cut = std::clamp(6.0 * far->deviation, cut, wide);
-    }
-    for (std::size_t j = inner_rungs; j < most; ++j) add_ring(j);
-    now.rungs = most;
-  }
+  fit_test_.look(points_, surface_, foot, look.gate, look.partial, new_frame);
+  add_wide_rings(cloud, place, foot, look.gate, usual / std::sqrt(information), cut);
   for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
   if (first && !spans_area()) {
     surface_ = before;
@@ -430,226 +439,266 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   estimate(foot, new_frame, new_frame);
   if (!look.partial) judge(foot);
   now.smooth = smooth_;
-  // What one camera sees whole another may see cut off by a shadow, in turn.
-  std::array<bool, Patch::max_views> is_judged{};
-  for (std::size_t i = 0; i < count_ && cameras_ > 1 && !look.partial; ++i) {
-    const Evidence& e = evidence(i);
-    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap()) continue;
-    smooth_ =
-        smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre * detail()));
-  }
+  if (cameras_ > 1 && !look.partial) smooth_ = is_smooth_for_any(foot);
   centre_ = foot;
   if (foot.norm() > 0.8 * detail() * coarseness()) move_origin(foot);
   return true;
 }
 
-// @param learns  new_frame, and nothing was learned from it yet
-void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) noexcept {
-  Evidence& now = evidence(0);
-  const Vec2 at = foot / unit();
-  Vec5 basis;
-  basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
-  const double area = squared(unit());
-
-  std::array<Vec5, rungs> shapes;
-  std::array<std::array<HeightSample, history>, rungs> heights;
-  std::array<std::size_t, rungs> frames{};
-  std::size_t chosen = 0;
-  // What the frames say of their own noise: [-] what one is worth beside its camera's others.
-  std::array<double, Patch::max_views> information{}, told{};
-  for (std::size_t i = 0; i < count_; ++i) {
-    information[evidence(i).camera] += evidence(i).information;
-    ++told[evidence(i).camera];
-  }
-  std::array<double, history> worth;
-  std::array<double, history + 1> worth_of;  // so many of the newest
-  worth_of[0] = 0.0;
+// Did the fit describe the newest frame of any camera there? What one camera sees whole another may
+// see cut off by a shadow, in turn.
+bool SurfaceEstimate::is_smooth_for_any(const Vec2& foot) noexcept {
+  std::array<bool, Patch::max_views> is_judged{};
   for (std::size_t i = 0; i < count_; ++i) {
     const Evidence& e = evidence(i);
-    worth[i] = e.information / (information[e.camera] / told[e.camera]);
-    worth_of[i + 1] = worth_of[i] + worth[i];
+    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap()) continue;
+    if (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre * detail())) return true;
   }
-  const std::size_t averaged =
-      std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
-  for (std::size_t j = 0; j < now.rungs; ++j) {
-    std::array<double, Patch::max_views> doubts{};
+  return false;
+}
+
+// Estimates the surface at `foot` [m, local] from all frames: each disc's shape and heights, then
+// which disc says where the surface is, then where that is.
+// @param learns  new_frame, and nothing was learned from it yet
+void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) noexcept {
+  Discs discs;
+  const Vec2 at = foot / unit();
+  discs.basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
+  weigh_frames(discs);
+  for (std::size_t j = 0; j < evidence(0).rungs; ++j) {
+    ByCamera doubts{};
     for (std::size_t c = 0; c < doubts.size(); ++c)
       if (is_known_[c]) doubts[c] = doubt(j, c);
-    // Evidence from frames whose disc overlaps this one's well.
-    const double farthest = squared(overlap(j));
-    Shape::Sums sums = Shape::Sums::Zero();
-    std::array<SlopeWindow, slope_windows> windows;
-    std::size_t filled = 0;
-    std::size_t whole = 0;
-    std::size_t n = 0;
-    for (; n < averaged; ++n) {
-      const Evidence& e = evidence(n);
-      if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
-      // A partly hidden disc determines the height, but hardly the slope.
-      if (!e.whole && n > 0) continue;
-      sums += worth[n] / doubts[e.camera] * e.shape[j].sums;
-      if (++whole == std::size_t{2} << filled && filled < slope_windows) {
-        windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
-      }
-    }
-    frames[j] = n;
-    const double points = std::max(now.shape[j].points, 1.0);
-    Scatter& scatter = scatter_[now.camera][j];
-    // Weight of the curvature prior in points, with correlated noise counted by its effect.
-    const double prior = variance(j) * points / area / squared(parameters_.curvature_sd * unit());
-    const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
-      a.diagonal().array() += 1e-9;
-      a.diagonal().tail<3>().array() += prior;
-      shapes[j] = solve_symmetric<5>(a, b);
-    };
-    fit_shape(Shape::matrix(sums), Shape::right_side(sums));
-    // One deviation more than elsewhere: each of four windows could be wrong in each frame.
-    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / area,
-                   parameters_.confidence + 1.0);
-    const double above = shapes[j].dot(basis);
-    std::array<double, Patch::max_views> own_frames{};
-    for (std::size_t i = 0; i < n; ++i) ++own_frames[evidence(i).camera];
-    std::array<double, Patch::max_views> usual_extent{};
-    std::array<HeightSample, 5> h;  // of this camera, without what it is worth beside others
-    std::size_t own = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Evidence& e = evidence(i);
-      heights[j][i] = {e.stamp,
-                       (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * unit(),
-                       1.0 / worth[i]};
-      usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
-    }
-    // A disc that an occluder begins to hide has fewer points and more noise.
-    for (std::size_t i = 0; i < n; ++i) {
-      const Evidence& e = evidence(i);
-      HeightSample& height = heights[j][i];
-      const double share = e.extent[j] / usual_extent[e.camera];
-      if (share < 0.8) height.doubt /= squared(std::max(share, 0.1));
-      if (e.camera == now.camera && own < h.size()) h[own++] = height;
-      height.doubt *= doubts[e.camera];
-    }
-    if (cameras_ > 1) align_cameras(std::span(heights[j].data(), n));
-    if (learns && own == h.size() && now.whole) {
-      // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
-      const double fourth =
-          h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
-      double change =
-          fourth * fourth /
-          (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
-      // A single jump is not noise.
-      if (scatter.samples >= 4.0) {
-        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise * detail()));
-      }
-      scatter.samples = std::min(scatter.samples + 1.0, 40.0);
-      scatter.variance += (change - scatter.variance) / scatter.samples;
-    }
-    if (learns)
-      scatter.at_rest = doubts[now.camera] * variance_at_rest(heights[j], std::min(n, rested_));
+    average_shape(j, foot, doubts, discs);
+    measure_heights(j, doubts, learns, discs);
   }
-  // Lepski's rule: the widest disc that agrees with all narrower ones determines the height. The
-  // differences between discs are taken frame by frame, so that motion cancels and their scatter is
-  // the noise. A disc may differ from the narrower ones, because the surface is not a quadric over
-  // its width, and yet move with them: then it determines the motion only.
-  const double negligible =
-      4e-4 * detail() + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
-  // Until a disc's noise has been measured over time, what its points scatter counts at most: the
-  // usual noise of a camera would let a wide disc agree that reaches beyond a body.
-  constexpr double unmeasured = 0.5;  // [-] of the spread
-  const auto measured = [&](std::size_t j) {
-    return scatter_[now.camera][j].samples > static_cast<double>(upper_bounds.size());
-  };
-  const auto expected = [&](std::size_t j) {
-    return measured(j) ? variance(j) : std::min(variance(j), squared(unmeasured * spread_));
-  };
-  // [-] A disc that is emptier than this, beside the narrowest, reaches beyond the body: at a
-  // straight edge half of it is empty.
-  constexpr double least_filled = 0.45;
-  std::size_t mover = 0;
-  std::size_t changed = 0;  // frames since
-  bool agree = true;
-  for (std::size_t j = 1; j < now.rungs; ++j) {
-    if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
-    bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
-    for (std::size_t i = 0; i < j && moves_along; ++i) {
-      const std::size_t n = std::min(frames[i], frames[j]);
-      const auto [sum, squares] = sums_over<2>(n, [&](std::size_t k) {
-        const double d = heights[j][k].height - heights[i][k].height;
-        return std::array{worth[k] * d, worth[k] * d * d};
-      });
-      const auto count = static_cast<double>(n);
-      const double mean = sum / worth_of[n];
-      const double about_mean = std::max(squares - worth_of[n] * mean * mean, 0.0);
-      // Noise falls at most with the area it is averaged over, so the difference from the next
-      // narrower disc is a lower bound of a disc's noise.
-      if (i + 1 == j && n >= 4) {
-        scatter_[now.camera][j].least =
-            (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
-      }
-      // Few differences may happen to be alike: what the heights' noise lets expect counts as
-      // `prior` more. Without it a contact that slides falls back on narrow discs in single frames.
-      constexpr double prior = 4.0;
-      const double freedom = count - 1.0 + prior;
-      const double scattered = (about_mean + prior * (expected(i) + expected(j))) / freedom;
-      // What is not measured yet is bounded, not estimated.
-      const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
-      const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
-      agree =
-          agree && std::abs(mean) <= confidence * std::sqrt(scattered / worth_of[n]) + negligible;
-      // What slides in under a contact at rest changes the newest frames alone: of the mean over
-      // all it is a small part, and it scatters. Only noise that was measured before shows it.
-      const auto most = [&](double variance) { return sds * std::sqrt(variance) + negligible; };
-      const std::span<const double> so_many(worth_of.data(), n + 1);
-      const bool differs =
-          measured(i) && measured(j) &&
-          changed_since(so_many, most(variance(i) + variance(j)), [&](std::size_t k) {
-            return worth[k] * (heights[j][k].height - heights[i][k].height);
-          }) > 0;
-      // Where the narrower one has changed itself, it is another surface that is touched.
-      if (differs && learns && changed == 0)
-        changed = changed_since(so_many, most(variance(i)),
-                                [&](std::size_t k) { return worth[k] * heights[i][k].height; });
-      agree = agree && !differs;
-      const double newest = heights[j][0].height - heights[i][0].height;
-      moves_along =
-          agree || (n >= 4 && !differs &&
-                    std::abs(newest - mean) <=
-                        parameters_.confidence * std::sqrt(scattered / worth[0]) + negligible);
-    }
-    if (!moves_along) break;
-    if (agree && variance(j) <= variance(chosen)) chosen = j;
-    if (variance(j) <= variance(mover)) mover = j;
-  }
-  if (changed > 0) {
-    count_ = changed;
-    settled_ = std::min(settled_, changed);
+  const Choice choice = choose_discs(discs, learns);
+  if (choice.changed > 0) {
+    count_ = choice.changed;
+    settled_ = std::min(settled_, choice.changed);
     rested_ = 0;
     estimate(foot, new_frame, false);
     return;
   }
-  rung_ = chosen;
-  mover_ = mover;
-  std::array<HeightSample, history>& past = heights[mover];
-  const std::size_t known = std::min(frames[chosen], frames[mover]);
-  if (mover != chosen) {
+  rung_ = choice.shape;
+  mover_ = choice.motion;
+  place_surface(discs, new_frame);
+}
+
+// What the frames say of their own noise: [-] what one is worth beside its camera's others.
+void SurfaceEstimate::weigh_frames(Discs& discs) noexcept {
+  ByCamera information{}, told{};
+  for (std::size_t i = 0; i < count_; ++i) {
+    information[evidence(i).camera] += evidence(i).information;
+    ++told[evidence(i).camera];
+  }
+  discs.worth_of[0] = 0.0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Evidence& e = evidence(i);
+    discs.worth[i] = e.information / (information[e.camera] / told[e.camera]);
+    discs.worth_of[i + 1] = discs.worth_of[i] + discs.worth[i];
+  }
+}
+
+// The shape in disc j, over the frames whose disc overlaps this one's well.
+void SurfaceEstimate::average_shape(std::size_t j, const Vec2& foot, const ByCamera& doubts,
+                                    Discs& discs) noexcept {
+  const std::size_t averaged =
+      std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
+  const double farthest = squared(overlap(j));
+  Shape::Sums sums = Shape::Sums::Zero();
+  std::array<SlopeWindow, slope_windows> windows;
+  std::size_t filled = 0;
+  std::size_t whole = 0;
+  std::size_t n = 0;
+  for (; n < averaged; ++n) {
+    const Evidence& e = evidence(n);
+    if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
+    // A partly hidden disc determines the height, but hardly the slope.
+    if (!e.whole && n > 0) continue;
+    sums += discs.worth[n] / doubts[e.camera] * e.shape[j].sums;
+    if (++whole == std::size_t{2} << filled && filled < slope_windows) {
+      windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
+    }
+  }
+  discs.frames[j] = n;
+  // What one point weighs, with correlated noise counted by its effect.
+  const double point_variance =
+      variance(j) * std::max(evidence(0).shape[j].points, 1.0) / squared(unit());
+  const double prior = point_variance / squared(parameters_.curvature_sd * unit());
+  Eigen::Matrix<double, 5, 5> a = Shape::matrix(sums);
+  a.diagonal().array() += 1e-9;
+  a.diagonal().tail<3>().array() += prior;
+  discs.shapes[j] = solve_symmetric<5>(a, Shape::right_side(sums));
+  // One deviation more than elsewhere: each of four windows could be wrong in each frame.
+  confine_slopes(discs.shapes[j], std::span(windows.data(), filled), point_variance,
+                 parameters_.confidence + 1.0);
+}
+
+// The heights that frames measured in disc j, with its shape over all of them.
+void SurfaceEstimate::measure_heights(std::size_t j, const ByCamera& doubts, bool learns,
+                                      Discs& discs) noexcept {
+  const Evidence& now = evidence(0);
+  const Vec5& shape = discs.shapes[j];
+  const double above = shape.dot(discs.basis);
+  const std::span<HeightSample> heights(discs.heights[j].data(), discs.frames[j]);
+  ByCamera own_frames{}, usual_extent{};
+  for (std::size_t i = 0; i < heights.size(); ++i) ++own_frames[evidence(i).camera];
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    const Evidence& e = evidence(i);
+    heights[i] = {e.stamp, (e.shape[j].height - e.shape[j].means.dot(shape) + above) * unit(),
+                  1.0 / discs.worth[i]};
+    usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
+  }
+  std::array<HeightSample, newest_heights> own;  // without what its camera is worth beside others
+  std::size_t owned = 0;
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    const Evidence& e = evidence(i);
+    HeightSample& height = heights[i];
+    // A disc that an occluder begins to hide has fewer points and more noise.
+    const double share = e.extent[j] / usual_extent[e.camera];
+    if (share < 0.8) height.doubt /= squared(std::max(share, 0.1));
+    if (e.camera == now.camera && owned < own.size()) own[owned++] = height;
+    height.doubt *= doubts[e.camera];
+  }
+  if (cameras_ > 1) align_cameras(heights);
+  if (!learns) return;
+  Scatter& scatter = scatter_[now.camera][j];
+  if (owned == own.size() && now.whole) learn_noise(own, scatter);
+  scatter.at_rest =
+      doubts[now.camera] * variance_at_rest(heights, std::min(heights.size(), rested_));
+}
+
+// Fourth differences do not see a smooth motion; their variance is 70 times a height's.
+void SurfaceEstimate::learn_noise(const std::array<HeightSample, newest_heights>& h,
+                                  Scatter& scatter) const noexcept {
+  const double fourth =
+      h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
+  double change = fourth * fourth /
+                  (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
+  // A single jump is not noise.
+  if (scatter.samples >= 4.0)
+    change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise * detail()));
+  scatter.samples = std::min(scatter.samples + 1.0, 40.0);
+  scatter.variance += (change - scatter.variance) / scatter.samples;
+}
+
+// Lepski's rule: the widest disc that agrees with all narrower ones determines the height. A disc
+// may differ from the narrower ones, because the surface is not a quadric over its width, and yet
+// move with them: then it determines the motion only.
+SurfaceEstimate::Choice SurfaceEstimate::choose_discs(const Discs& discs, bool learns) noexcept {
+  const Evidence& now = evidence(0);
+  // [-] A disc that is emptier than this, beside the narrowest, reaches beyond the body: at a
+  // straight edge half of it is empty.
+  constexpr double least_filled = 0.45;
+  Choice choice;
+  bool agree = true;
+  for (std::size_t j = 1; j < now.rungs; ++j) {
+    if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
+    bool moves_along = discs.frames[j] >= std::min<std::size_t>(discs.frames[0], 2);
+    for (std::size_t i = 0; i < j && moves_along; ++i) {
+      const Comparison comparison = compare(i, j, discs, learns && choice.changed == 0);
+      agree = agree && comparison.agree;
+      moves_along = agree || comparison.moves_along;
+      choice.changed = std::max(choice.changed, comparison.changed);
+    }
+    if (!moves_along) break;
+    if (agree && variance(j) <= variance(choice.shape)) choice.shape = j;
+    if (variance(j) <= variance(choice.motion)) choice.motion = j;
+  }
+  return choice;
+}
+
+// Does disc j agree with the narrower i? Their differences are taken frame by frame, so that motion
+// cancels and their scatter is the noise.
+SurfaceEstimate::Comparison SurfaceEstimate::compare(std::size_t i, std::size_t j,
+                                                     const Discs& discs, bool asks_since) noexcept {
+  const std::array<HeightSample, history>& narrow = discs.heights[i];
+  const std::array<HeightSample, history>& wide = discs.heights[j];
+  const std::size_t n = std::min(discs.frames[i], discs.frames[j]);
+  const std::span<const double> worth_of(discs.worth_of.data(), n + 1);
+  const auto difference = [&](std::size_t k) { return wide[k].height - narrow[k].height; };
+  const auto [sum, squares] = sums_over<2>(n, [&](std::size_t k) {
+    const double d = difference(k);
+    return std::array{discs.worth[k] * d, discs.worth[k] * d * d};
+  });
+  const auto count = static_cast<double>(n);
+  const double mean = sum / worth_of[n];
+  const double about_mean = std::max(squares - worth_of[n] * mean * mean, 0.0);
+  // Noise falls at most with the area it is averaged over, so the difference from the next narrower
+  // disc is a lower bound of a disc's noise.
+  if (i + 1 == j && n >= 4) {
+    scatter_[evidence(0).camera][j].least =
+        (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
+  }
+  const double negligible =
+      4e-4 * detail() + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
+  // Few differences may happen to be alike: what the heights' noise lets expect counts as `prior`
+  // more. Without it a contact that slides falls back on narrow discs in single frames.
+  constexpr double prior = 4.0;
+  const double freedom = count - 1.0 + prior;
+  const double scattered =
+      (about_mean + prior * (expected_variance(i) + expected_variance(j))) / freedom;
+  // What is not measured yet is bounded, not estimated.
+  const bool measured = is_measured(i) && is_measured(j);
+  const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
+  const double confidence = measured ? t_quantile(sds, freedom) : sds;
+  // What slides in under a contact at rest changes the newest frames alone: of the mean over all it
+  // is a small part, and it scatters. Only noise that was measured before shows it.
+  const auto most = [&](double variance) { return sds * std::sqrt(variance) + negligible; };
+  const bool differs =
+      measured && changed_since(worth_of, most(variance(i) + variance(j)),
+                                [&](std::size_t k) { return discs.worth[k] * difference(k); }) > 0;
+  Comparison comparison;
+  // Where the narrower one has changed itself, it is another surface that is touched.
+  if (differs && asks_since)
+    comparison.changed = changed_since(worth_of, most(variance(i)), [&](std::size_t k) {
+      return discs.worth[k] * narrow[k].height;
+    });
+  comparison.agree =
+      !differs && std::abs(mean) <= confidence * std::sqrt(scattered / worth_of[n]) + negligible;
+  comparison.moves_along =
+      n >= 4 && !differs &&
+      std::abs(difference(0) - mean) <=
+          parameters_.confidence * std::sqrt(scattered / discs.worth[0]) + negligible;
+  return comparison;
+}
+
+// Has a disc's noise been measured over time?
+bool SurfaceEstimate::is_measured(std::size_t rung) noexcept {
+  return scatter_[evidence(0).camera][rung].samples > static_cast<double>(upper_bounds.size());
+}
+
+// [m^2] Until then what its points scatter counts at most: the usual noise of a camera would let a
+// wide disc agree that reaches beyond a body.
+double SurfaceEstimate::expected_variance(std::size_t rung) noexcept {
+  constexpr double unmeasured = 0.5;  // [-] of the spread
+  return is_measured(rung) ? variance(rung)
+                           : std::min(variance(rung), squared(unmeasured * spread_));
+}
+
+// Where the surface is, and how it moves, by the discs that were chosen.
+void SurfaceEstimate::place_surface(Discs& discs, bool new_frame) noexcept {
+  std::array<HeightSample, history>& past = discs.heights[mover_];
+  const std::size_t known = std::min(discs.frames[rung_], discs.frames[mover_]);
+  if (mover_ != rung_) {
     double difference = 0.0;
     for (std::size_t k = 0; k < known; ++k) {
-      difference += (heights[chosen][k].height - past[k].height) / static_cast<double>(known);
+      difference += (discs.heights[rung_][k].height - past[k].height) / static_cast<double>(known);
     }
-    for (std::size_t k = 0; k < frames[mover]; ++k) past[k].height += difference;
+    for (std::size_t k = 0; k < discs.frames[mover_]; ++k) past[k].height += difference;
   }
-  const std::span<const HeightSample> since(past.data(),
-                                            std::clamp<std::size_t>(settled_, 1, frames[mover]));
-  const double sd = height_sd();
-  const HeightTrack track = track_height(since, sd, interval_, parameters_);
+  const std::span<const HeightSample> since(
+      past.data(), std::clamp<std::size_t>(settled_, 1, discs.frames[mover_]));
+  const HeightTrack track = track_height(since, height_sd(), interval_, parameters_);
   if (new_frame) {
     velocity_ = track.velocity;
     rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
   }
-  const double height = track.height;
-  surface_.c.tail<5>() = shapes[chosen];
+  surface_.c.tail<5>() = discs.shapes[rung_];
   surface_.c.tail<3>() /= unit();
-  above_mean_ = since.front().height - height;
-  surface_.c[0] = height - shapes[chosen].dot(basis) * unit();
+  above_mean_ = since.front().height - track.height;
+  surface_.c[0] = track.height - discs.shapes[rung_].dot(discs.basis) * unit();
 }
 
 // Where cameras' poses are not quite right, their heights differ by what is no motion: takes from
@@ -689,73 +738,6 @@ void SurfaceEstimate::align_cameras(std::span<HeightSample> heights) noexcept {
   }
 }
 
-// Means of the inner patch's points in cells of a square about `foot`. Structure stays from frame
-// to frame, noise does not.
-void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
-  if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
-  Cells& now = cells_[newest_cells_];
-  const Vec2 corner = foot / cell_size_ - Vec2::Constant(0.5 * cells_per_side);
-  now.first = corner.array().round().cast<int>();
-  now.heights.fill(0.0);
-  now.means.fill(Vec6::Zero());
-  const FloatQuadric surface(surface_);
-  const auto first_u = static_cast<float>(now.first.x());
-  const auto first_v = static_cast<float>(now.first.y());
-  const auto per_cell = static_cast<float>(1.0 / cell_size_);
-  const auto gate = static_cast<float>(look.gate);
-  for (std::size_t i = 0; i < points_.size; ++i) {
-    const float x = points_.x[i];
-    const float y = points_.y[i];
-    const float z = points_.z[i];
-    const float u = x * per_cell - first_u;
-    const float v = y * per_cell - first_v;
-    if (!(u >= 0.0F && v >= 0.0F && u < cells_per_side && v < cells_per_side)) continue;
-    if (!(std::abs(z - surface.height(x, y)) <= gate)) continue;
-    const auto k =
-        static_cast<std::size_t>(static_cast<int>(v) * cells_per_side + static_cast<int>(u));
-    now.heights[k] += double{z};
-    now.means[k] += quadric_basis(Vec2(x, y));
-  }
-  // Noise leaves single cells empty, an edge leaves a whole row.
-  constexpr int most_empty = 2;
-  int empty = 0;
-  for (std::size_t k = 0; k < cells; ++k) {
-    const double count = now.means[k][0];
-    if (!(count > 0.0)) {
-      ++empty;
-      continue;
-    }
-    now.heights[k] /= count;
-    now.means[k] /= count;
-  }
-  now.full = !look.partial && empty <= most_empty;
-}
-
-// Mean square of the cells' residuals about their own best quadric [m^2]: errors of the fit, which
-// grow towards the corners, do not count as structure.
-double SurfaceEstimate::squared_structure(
-    const Cells& frame, const std::array<double, cells>& residuals) const noexcept {
-  Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
-  Vec6 b = Vec6::Zero();
-  std::array<Vec6, cells> basis;
-  for (std::size_t k = 0; k < cells; ++k) {
-    Vec6& means = basis[k];
-    means = frame.means[k];
-    means.segment<2>(1) *= 1.0 / unit();
-    means.tail<3>() *= 1.0 / squared(unit());
-    a.noalias() += means * means.transpose();
-    b += residuals[k] * means;
-  }
-  const Vec6 c = solve_symmetric<6>(a, b);
-  double sum = 0.0;
-  double present = 0.0;
-  for (std::size_t k = 0; k < cells; ++k) {
-    sum += squared(residuals[k] - c.dot(basis[k]));
-    present += frame.means[k][0];
-  }
-  return sum / (present - 6.0);
-}
-
 // Do the points span an area, so that they determine a slope? Those of a border seen from its side
 // lie in a line.
 bool SurfaceEstimate::spans_area() const noexcept {
@@ -766,7 +748,7 @@ bool SurfaceEstimate::spans_area() const noexcept {
   return least > 0.05 * full_disc();
 }
 
-// Does the fit describe the surface, up to noise?
+// Does the fit describe the surface, up to noise, in this camera's newest frame or in another's?
 void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   // At an edge the points lie to one side of the disc, at a gap around an empty middle.
   const Vec2 middle = middle_.head<2>();
@@ -776,82 +758,14 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const bool whole = (middle * unit() - foot).norm() < 0.85 * slack * radii_[0] &&
                      spread.minCoeff() > (1.0 - slack) * full_disc() &&
                      spread.maxCoeff() < (1.0 + slack) * full_disc();
-  if (!whole) {
-    smooth_ = false;
-    return;
-  }
-  const Cells& newest = cells_[newest_cells_];
-  if (!newest.full) {
-    smooth_ = false;
-    return;
-  }
-  // Residuals over the surface as it is known now, less what all cells share; 0 of empty ones.
-  const auto residuals_of = [this](const Cells& frame) {
-    std::array<double, cells> residuals;
-    double sum = 0.0;
-    double present = 0.0;
-    for (std::size_t k = 0; k < cells; ++k) {
-      residuals[k] = frame.heights[k] - surface_.c.dot(frame.means[k]);
-      sum += residuals[k];
-      present += frame.means[k][0];
-    }
-    for (std::size_t k = 0; k < cells; ++k) residuals[k] -= frame.means[k][0] * sum / present;
-    return residuals;
-  };
-  const std::array<double, cells> residuals = residuals_of(newest);
-  std::array<double, cells> sums = residuals;
-  std::size_t frames = 1;
-  for (; frames < cell_frames; ++frames) {
-    const Cells& past = cells_[(newest_cells_ + cell_frames - frames) % cell_frames];
-    if (!past.full) break;
-    const std::array<double, cells> older = residuals_of(past);
-    if (frames == 1) learn_cell_noise(newest, residuals, past, older);
-    if (past.first != newest.first) break;
-    for (std::size_t k = 0; k < cells; ++k) sums[k] += older[k];
-  }
-  const auto n = static_cast<double>(frames);
-  const double structure = squared_structure(newest, sums) / squared(n);
-  // Structure below the noise of one frame is ignored: over points the proxy would not rest better.
-  const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
-  smooth_ = structure <= squared(structure_floor * detail()) + times * cell_scatter_.variance;
-}
-
-// Noise of a cell, from the differences of two frames in the cells that both measured, less their
-// common part.
-void SurfaceEstimate::learn_cell_noise(const Cells& newest,
-                                       const std::array<double, cells>& residuals,
-                                       const Cells& past,
-                                       const std::array<double, cells>& older) noexcept {
-  const Eigen::Vector2i offset = newest.first - past.first;
-  double sum = 0.0;
-  double squares = 0.0;
-  double shared = 0.0;
-  for (int v = 0; v < cells_per_side; ++v) {
-    for (int u = 0; u < cells_per_side; ++u) {
-      const int past_u = u + offset.x();
-      const int past_v = v + offset.y();
-      if (past_u < 0 || past_v < 0 || past_u >= cells_per_side || past_v >= cells_per_side)
-        continue;
-      const auto k = static_cast<std::size_t>(v * cells_per_side + u);
-      const auto past_k = static_cast<std::size_t>(past_v * cells_per_side + past_u);
-      if (newest.means[k][0] == 0.0 || past.means[past_k][0] == 0.0) continue;
-      const double change = residuals[k] - older[past_k];
-      sum += change;
-      squares += squared(change);
-      shared += 1.0;
-    }
-  }
-  constexpr double enough = 6.0;
-  if (shared < enough) return;
-  const double change = std::max(squares - sum * sum / shared, 0.0) / (2.0 * (shared - 1.0));
-  cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
-  cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
+  smooth_ = whole && fit_test_.describes(surface_, detail(), smooth_);
 }
 
 // Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
 void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
-  const Eigen::Vector2i step = (foot / cell_size_).array().round().cast<int>();
-  const Vec2 to = cell_size_ * step.cast<double>();
+  const double cell = fit_test_.cell_size();
+  const Eigen::Vector2i step = (foot / cell).array().round().cast<int>();
+  const Vec2 to = cell * step.cast<double>();
   const Vec3 shift(to.x(), to.y(), surface_.height(to));
   const Vec2 gradient = surface_.gradient(to);
   frame_.origin = frame_.world_from_local(shift);
@@ -859,18 +773,7 @@ void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
   surface_.c[1] = gradient.x();
   surface_.c[2] = gradient.y();
   centre_ -= to;
-  for (Cells& past : cells_) {
-    past.first -= step;
-    for (std::size_t k = 0; k < cells; ++k) {
-      Vec6& m = past.means[k];
-      if (m[0] == 0.0) continue;  // empty
-      past.heights[k] -= shift.z();
-      m[3] += to.x() * (to.x() - 2.0 * m[1]);
-      m[4] += to.x() * to.y() - to.x() * m[2] - to.y() * m[1];
-      m[5] += to.y() * (to.y() - 2.0 * m[2]);
-      m.segment<2>(1) -= to;
-    }
-  }
+  fit_test_.move_origin(step, shift);
   // A disc that lies twice as far as discs may overlap from a newer frame's is never reached again,
   // nor is what is older. The newest frame's may still be moved.
   const Vec2 newer = count_ > 1 ? evidence(1).centre : foot;

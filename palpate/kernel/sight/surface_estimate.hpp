@@ -8,6 +8,7 @@
 #include <span>
 
 #include "palpate/kernel/core/cloud.hpp"
+#include "palpate/kernel/sight/fit_test.hpp"
 #include "palpate/kernel/sight/height_track.hpp"
 #include "palpate/kernel/sight/surface_fit.hpp"
 
@@ -135,8 +136,8 @@ class SurfaceEstimate {
   using Vec5 = Eigen::Matrix<double, 5, 1>;
   static constexpr std::size_t history = most_heights;
   static constexpr std::size_t frames_of_a_camera = 64;
-  static constexpr int cells_per_side = 4;
-  static constexpr std::size_t cells = cells_per_side * cells_per_side;
+  static constexpr std::size_t newest_heights = 5;  // whose fourth difference is looked at
+  using ByCamera = std::array<double, Patch::max_views>;
 
   /// Moments with the height eliminated (Schur's complement): what remains determines slope and
   /// curvature.
@@ -165,20 +166,6 @@ class SurfaceEstimate {
     std::array<double, SurfaceEstimate::rungs> extent;  // points in reach, thinned or not
     double information = 1.0;  // [-] mean of (usual noise / reading's noise)^2
   };
-  /// Means over the points in each cell of a square about a frame's contact. Cells are those of a
-  /// lattice through the local origin, so that frames can be compared while the contact slides.
-  struct Cells {
-    Cells() noexcept {
-      heights.fill(0.0);
-      means.fill(Vec6::Zero());
-    }
-
-    bool full = false;  // nearly all cells have points, and no occluder hid any
-    Eigen::Vector2i first = Eigen::Vector2i::Zero();  // of the lattice's cells
-    std::array<double, cells> heights;                // [m]
-    std::array<Vec6, cells> means;                    // of quadric_basis
-  };
-  static constexpr std::size_t cell_frames = 8;
   /// Variance of a height from frame to frame.
   struct Scatter {
     double variance = 0.0;  // [m^2] from fourth differences, which smooth motion hardly changes
@@ -191,7 +178,34 @@ class SurfaceEstimate {
     double deviation;  // [m] as of a normal distribution
   };
 
+  /// What all frames say of each disc.
+  struct Discs {
+    Vec5 basis;                                                    // x, y, xx, xy, yy of the place
+    std::array<Vec5, rungs> shapes;                                // slope and curvature [unit]
+    std::array<std::array<HeightSample, history>, rungs> heights;  // the newest first
+    std::array<std::size_t, rungs> frames{};                       // of these
+    std::array<double, history> worth;         // [-] of a frame, beside its camera's others
+    std::array<double, history + 1> worth_of;  // [-] of so many of the newest together
+  };
+  struct Choice {
+    std::size_t shape = 0;    // the disc that determines shape and height
+    std::size_t motion = 0;   // the disc that determines motion
+    std::size_t changed = 0;  // the newest frames that show another surface
+  };
+  struct Comparison {
+    bool agree;               // two discs, up to noise
+    bool moves_along;         // the wider in the newest frame, as ever
+    std::size_t changed = 0;  // as Choice's
+  };
+
   bool measure(const Cloud& cloud, const Vec2& foot, const Look& look, bool new_frame) noexcept;
+  bool find_surface(const Vec2& foot, double wide, double& cut) noexcept;
+  void start_evidence(bool jumped) noexcept;
+  [[nodiscard]] Moments moments_of(const Disc& disc, bool is_weighted) const noexcept;
+  void add_ring(std::size_t j, const Vec2& foot, double cut) noexcept;
+  void add_wide_rings(const Cloud& cloud, const Vec3& place, const Vec2& foot, double wide,
+                      double reading, double cut) noexcept;
+  [[nodiscard]] bool is_smooth_for_any(const Vec2& foot) noexcept;
   [[nodiscard]] std::optional<Residuals> residuals(const Vec2& foot, double radius,
                                                    double gate) const noexcept;
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
@@ -200,9 +214,18 @@ class SurfaceEstimate {
   /// @param usual  [m]  @return their mean; 1, and no weights, if it says nothing
   double weigh(const Cloud& cloud, double usual) noexcept;
   void estimate(const Vec2& foot, bool new_frame, bool learns) noexcept;
-  void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
-  [[nodiscard]] double squared_structure(const Cells& frame,
-                                         const std::array<double, cells>& residuals) const noexcept;
+  void weigh_frames(Discs& discs) noexcept;
+  void average_shape(std::size_t j, const Vec2& foot, const ByCamera& doubts,
+                     Discs& discs) noexcept;
+  void measure_heights(std::size_t j, const ByCamera& doubts, bool learns, Discs& discs) noexcept;
+  void learn_noise(const std::array<HeightSample, newest_heights>& h,
+                   Scatter& scatter) const noexcept;
+  [[nodiscard]] Choice choose_discs(const Discs& discs, bool learns) noexcept;
+  [[nodiscard]] Comparison compare(std::size_t i, std::size_t j, const Discs& discs,
+                                   bool asks_since) noexcept;
+  [[nodiscard]] bool is_measured(std::size_t rung) noexcept;
+  [[nodiscard]] double expected_variance(std::size_t rung) noexcept;
+  void place_surface(Discs& discs, bool new_frame) noexcept;
   [[nodiscard]] bool spans_area() const noexcept;
   /// [m] of the moments.
   [[nodiscard]] double unit() const noexcept { return 2.0 * detail(); }
@@ -213,8 +236,6 @@ class SurfaceEstimate {
   /// Discs of a rung are evidence about the same place if their centres are within this [m].
   [[nodiscard]] double overlap(std::size_t rung) const noexcept { return 0.5 * radii_[rung]; }
   void judge(const Vec2& foot) noexcept;
-  void learn_cell_noise(const Cells& newest, const std::array<double, cells>& residuals,
-                        const Cells& past, const std::array<double, cells>& older) noexcept;
   void move_origin(const Vec2& foot) noexcept;
   [[nodiscard]] Evidence& evidence(std::size_t age) noexcept {
     return ring_[(newest_ + history - age) % history];
@@ -251,8 +272,7 @@ class SurfaceEstimate {
   std::size_t mover_ = 0;       // the disc that determines motion
 
   std::array<Evidence, history> ring_;
-  std::array<Cells, cell_frames> cells_;
-  std::size_t newest_cells_ = 0;
+  FitTest fit_test_;
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
   std::size_t settled_ = 0;
@@ -266,11 +286,9 @@ class SurfaceEstimate {
   std::array<double, Patch::max_views> distances_{};  // [m] from the viewpoints
   std::array<double, Patch::max_views> noisier_;      // [-] than usual its readings are, as it says
   std::array<double, rungs> radii_{};                 // [m] of the discs
-  double cell_size_ = 0.0;                            // [m]
 
   // The sensor's noise is kept when a contact ends.
   std::array<std::array<Scatter, rungs>, Patch::max_views> scatter_;  // by camera
-  Scatter cell_scatter_;
 };
 
 }  // namespace palpate

@@ -73,9 +73,7 @@ PALPATE_VECTORISED FloatMoments sum_moments(const float* px, const float* py, co
       const float xy = x * y;
       const float yy = y * y;
       const float r = z - (c[0] + c[1] * x + c[2] * y + c[3] * xx + c[4] * xy + c[5] * yy);
-      const float dx = x - centre_x;
-      const float dy = y - centre_y;
-      const float away = dx * dx + dy * dy;
+      const float away = (x - centre_x) * (x - centre_x) + (y - centre_y) * (y - centre_y);
       const float in_disc = ((away >= inner_squared) & (away < outer_squared)) ? 1.0F : 0.0F;
       float t = r * inverse_cut;
       t = t * t;

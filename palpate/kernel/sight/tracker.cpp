@@ -27,8 +27,7 @@ double layer_gap(const SurfaceEstimate& surface) {
   return std::max(narrowest_layer_gap * surface.detail(), steepest * surface.resolution());
 }
 constexpr std::size_t beam_points = 256;
-// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge
-// [detail].
+// Radius within which an occluder is looked for: that of the cells of FitTest [detail].
 constexpr double shadow_radius = 3.0;
 // A fit is used for contacts within this of its centre [detail].
 constexpr double serves = 0.3;

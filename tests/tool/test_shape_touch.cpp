@@ -465,6 +465,51 @@ TEST(ShapeTouch, IsNeverBehindASurfaceThatComes) {
 }
 
 // Hazard: tool-pushes
+TEST(ShapeTouch, DoesNotGoBackWhereAFrameOfASurfaceThatComesShowsNothing) {
+  Part rising = part(HalfSpace{});
+  rising.motion = {.start = 1.0, .speed = 0.5};
+  Stage stage(Scene({rising}), "box:40x20x5mm", "ideal", 0.7, 0.0);
+  const auto hand = [](double) { return pose({0, 0, 0.0}); };
+  double highest = 0.0, back = 0.0;
+  const auto see = [&](const Tick& tick) {
+    highest = std::max(highest, tick.proxy.z());
+    back = std::max(back, highest - tick.proxy.z());
+  };
+  stage.run(1.2, [](double t) { return pose({0, 0, std::max(0.03 - 0.05 * t, 0.0)}); });
+  stage.blind = true;
+  stage.run(frame_time, hand, see);
+  EXPECT_GT(highest, 0.08);
+  EXPECT_LT(back, 1e-3);
+}
+
+// A tool that comes nearer spans more pixels: its cells become coarser, with the frame that shows
+// where the surface is by now.
+TEST(SeenSurface, KnowsWhereASurfaceThatComesIsWhenItsCellsBecomeCoarser) {
+  Part rising = part(HalfSpace{});
+  rising.motion = {.start = 0.1, .speed = 0.5};
+  CameraSetup setup;
+  setup.world_from_camera = looking_at_origin(0.6, 0.0, 0.0);
+  SyntheticCamera camera(Scene({rising}), setup, SensorModel::named("ideal"));
+  const SightParameters parameters;
+  SeenSurface seen;
+  double t = 0.0;
+  for (int i = 0; i < 15; ++i) {
+    const double radius = i < 14 ? 0.03 : 0.08;
+    const Frame frame = camera.capture(i * frame_time, static_cast<std::uint64_t>(i));
+    seen.observe(*frame.cloud->image(), {Vec3::Zero(), radius}, frame.stamp, frame_time,
+                 parameters);
+    for (; t < (i + 0.99) * frame_time; t += 1e-3) {
+      seen.start_tick({Vec3::Zero(), radius}, t, parameters);
+      if (t < 12 * frame_time) continue;
+      const double height = 0.5 * (t - 0.1);
+      const auto fit = seen.fit({0, 0, height}, -Vec3::UnitZ(), 0.1);
+      ASSERT_TRUE(fit) << t;
+      EXPECT_NEAR(fit->gap, 0.0, 2e-3) << t;
+    }
+  }
+}
+
+// Hazard: tool-pushes
 TEST(ShapeTouch, HoldsAHandThatIsFarBehindASurfaceFromOneTickToTheNext) {
   for (const double depth : {0.05, 0.15}) {  // [m] less and more than the sides of bodies
     Stage stage(plane());
@@ -536,6 +581,32 @@ TEST(ShapeTouch, IsPushedAsideByABoxThatSlidesIn) {
       EXPECT_LT(aside, 0.02) << sensor << speed;
       EXPECT_GT(last.force.x(), 12.0) << sensor << speed;
     }
+  }
+}
+
+// Hazard: tool-pushes
+// Seen from aside, a box of 58 mm is 66 mm nearer than the plane behind it.
+TEST(ShapeTouch, IsPushedAsideByAHighBoxThatIsSeenFromAside) {
+  for (const char* sensor : {"ideal", "d4xx"}) {
+    Part box = part(block(Vec3(0.03, 0.04, 0.029)));
+    box.world_from_part.translation() = Vec3(-0.12, 0, 0.029);
+    box.motion = {.direction = Vec3::UnitX(), .start = 3.0, .speed = 0.3};
+    Stage stage(Scene({part(HalfSpace{}), box}), "box:40x20x5mm", sensor, 0.5, 0.5);
+    const HandPose at = pose({0, 0, -2.5e-3});
+    stage.press(at);
+    double in_it = 0.0, longest = 0.0, change = 0.0;
+    Vec3 before = 600.0 * Vec3::UnitZ() * 5e-3;
+    stage.run(
+        0.4, [&](double) { return at; },
+        [&](const Tick& tick) {
+          const double inside = -0.09 + 0.3 * (tick.t - 3.0) - (tick.proxy.x() - 0.02);
+          in_it = inside > 0.45 * frame_time + 3e-3 ? in_it + 1e-3 : 0.0;
+          longest = std::max(longest, in_it);
+          change = std::max(change, (tick.force - before).norm());
+          before = tick.force;
+        });
+    EXPECT_LT(longest, 0.05) << sensor;
+    EXPECT_LT(change, 2.0) << sensor;
   }
 }
 

@@ -22,6 +22,10 @@ constexpr float most_relief = 128.0F;    // frames in a cell's mean
 constexpr double slow_intervals = 4.0;
 constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
+// What comes nearer by more than what may strike a surface hides what was there. [-] So much nearer
+// than it is high is a body that is seen 30 degrees from aside, and [-] spreads of a reading.
+constexpr double aslant = 1.15;
+constexpr float hiding_spreads = 2.0F;
 constexpr float flying_spreads = 2.0F;  // [-] that a reading beside an occluder may be nearer
 constexpr int edge = 2;                 // [cells] from an occluder to where readings may be so
 // [-] beside `deepest`, by which a body is nearer that begins to slide; by which it is while it
@@ -73,11 +77,6 @@ constexpr double rim_spreads = 4.0;
 constexpr int farthest_side = 8;
 constexpr double least_across = 0.5;
 constexpr int farthest_out = 48;  // [cells] to where a body is pushed away, that slid over a tool
-
-// [m] What comes nearer by more between two frames hides what was there.
-float strike(const SightParameters& parameters) {
-  return static_cast<float>(farthest_strike * parameters.detail);
-}
 
 // (4), block by block: compilers make vector code of all but the look-up.
 PALPATE_VECTORISED
@@ -159,6 +158,11 @@ Eigen::Vector2d SeenSurface::cell_of(const Vec3& p) const noexcept {
   const double middle = 0.5 * (stride_ - 1);  // of a cell, behind its first pixel
   return {(k.cx + shift_u_ + k.fx * p.x() / p.z() - middle) / stride_,
           (k.cy + shift_v_ + k.fy * p.y() / p.z() - middle) / stride_};
+}
+
+float SeenSurface::hiding(const SightParameters& parameters) const noexcept {
+  return static_cast<float>(aslant * farthest_strike * parameters.detail) +
+         hiding_spreads * spread_;
 }
 
 double SeenSurface::level(double t) const noexcept {
@@ -287,7 +291,7 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
   std::array<float, std::size_t{most_across + 1} * (most_across + 1)> values;
   // What comes so much nearer at once is an occluder: it measures nothing. If it hides half of the
   // cells, the rest is too little.
-  const float hidden = frames_ > 1 ? static_cast<float>(level(stamp_)) - strike(parameters)
+  const float hidden = frames_ > 1 ? static_cast<float>(level(stamp_)) - hiding(parameters)
                                    : std::numeric_limits<float>::lowest();
   std::size_t size = 0, known = 0;
   double noise = 0.0;
@@ -334,7 +338,7 @@ void SeenSurface::update(std::size_t i, float z, float spread,
     }
     return;
   }
-  if (z == 0.0F || z - newest_ - all.relief[i] < -strike(parameters)) {  // hidden
+  if (z == 0.0F || z - newest_ - all.relief[i] < -hiding(parameters)) {  // hidden
     if (stamp_ - all.seen[i] > parameters.hidden_hold + parameters.hidden_fade) {
       all.relief[i] = all.smooth[i] = unknown;
       all.frames[i] = 0.0F;
@@ -353,7 +357,7 @@ bool SeenSurface::flies(int u, int v, float z, const SightParameters& parameters
   if (!(above(u, v, z) > flying_spreads * spread_)) return false;  // nearly always
   for (int y = v - edge; y <= v + edge; ++y)
     for (int x = u - edge; x <= u + edge; ++x)
-      if (has(x, y) && above(x, y, read(x, y)) > strike(parameters)) return true;
+      if (has(x, y) && above(x, y, read(x, y)) > hiding(parameters)) return true;
   return false;
 }
 
@@ -408,7 +412,7 @@ void SeenSurface::slide() noexcept {
 // Takes further rows of the newest frame in: all at once would be felt as a late tick.
 void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcept {
   if (rows_read_ == side) return;
-  const float nearer = strike(parameters);
+  const float nearer = hiding(parameters);
   const bool has_noise = image_->has_noise();
   for (; rows > 0 && rows_read_ < side; --rows, ++rows_read_) {
     const int v = v_ + ((rows_read_ - v_) & (side - 1));  // each row of the memory once
@@ -437,6 +441,7 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
   whole_ = slid_ = false;
   if (goes_on) read_rows(side, parameters);  // what is left of the frame before
   if (!blend_due_) carried_ = level(t_) + offset(t_);
+  const double held = level(stamp);  // where it is if this frame does not measure it
   image_ = &image;
   pose_ = image.world_from_camera();
   stamp_ = stamp;
@@ -463,7 +468,6 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
     spread_ = static_cast<float>(usual * newest_ * newest_);
     return;
   }
-  aim_at(aim);
   blend_due_ = true;
   if (find_level(aim, parameters)) {
     std::copy_backward(levels_.begin(), levels_.begin() + most_frames - 1,
@@ -476,8 +480,10 @@ void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp,
     level_ = track.height;
     velocity_ = track.velocity;
   } else {
+    level_ = held;
     velocity_ = 0.0;
   }
+  aim_at(aim);  // by the new level: cells that begin have their relief over it
   rows_read_ = 0;
   struck_ = 0;
 }

@@ -93,6 +93,8 @@ class SeenSurface {
   }
   /// [m] standard deviation of a cell's average.
   [[nodiscard]] double noise() const noexcept;
+  /// [m] What comes nearer by more between two frames hides what was there.
+  [[nodiscard]] float hiding(const SightParameters& parameters) const noexcept;
   /// [m/s] world: how the surface moves.
   [[nodiscard]] Vec3 velocity(double t) const noexcept;
   /// [-] world, towards the camera from a place.

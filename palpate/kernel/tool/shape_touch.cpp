@@ -8,7 +8,6 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/core/mathematics.hpp"
-#include "palpate/kernel/sight/monitor.hpp"
 #include "palpate/kernel/sight/render.hpp"
 
 namespace palpate {
@@ -166,17 +165,17 @@ void ShapeTouch::scan(const Pose& pose, std::size_t most, Scan& scan, Behind* be
   std::array<SeenSurface::View, most_cameras> views{};
   std::array<std::uint8_t, most_cameras> camera{};
   std::size_t cameras = 0;
-  float noise = 0.0F;
+  float noise = 0.0F, hiding = 0.0F;
   for (std::size_t i = 0; i < most_cameras; ++i) {
     if (!seen_[i].active()) continue;
     views[cameras] = seen_[i].view(world_from_tool);
     camera[cameras++] = static_cast<std::uint8_t>(i);
     noise = std::max(noise, static_cast<float>(seen_[i].noise()));
+    hiding = std::max(hiding, seen_[i].hiding(parameters_.sight));
   }
   const auto side_depth = static_cast<float>(parameters_.sight.side_depth);
   const float inside = -static_cast<float>(free_gap) - 2.0F * noise;
   constexpr auto too_deep = static_cast<float>(-deepest);
-  const auto strike = static_cast<float>(-farthest_strike * parameters_.sight.detail);
   const bool has_side = sliding_side_.size(last_t_) > 0;
   constexpr auto near = static_cast<float>(2.0 * margin);
   for (std::size_t patch = 0; patch < most_contacts; ++patch) {
@@ -210,7 +209,7 @@ void ShapeTouch::scan(const Pose& pose, std::size_t most, Scan& scan, Behind* be
         if (gap < inside && gap > -side_depth) ++scan.inside;
         if (gap < too_deep && gap > -side_depth && !was_behind) ++scan.crossed;
         const bool is_slid_over =
-            gap > strike && (was == slid_over || (slid_ && !was_behind && gap < too_deep));
+            gap > -hiding && (was == slid_over || (slid_ && !was_behind && gap < too_deep));
         // Behind until it has been in front again.
         if (gap < too_deep || (was == Place::behind && gap < 0.0F) ||
             (is_slid_over && has_side && gap < inside)) {
@@ -242,6 +241,9 @@ void ShapeTouch::scan(const Pose& pose, std::size_t most, Scan& scan, Behind* be
 
 void ShapeTouch::find_contacts(const Scan& scan) noexcept {
   contact_count_ = 0;
+  if (taken_in_) find_sliding_side();
+  taken_in_ = slid_ = false;
+  const std::size_t sides = sliding_side_.size(last_t_);
   for (std::size_t i = 0; i < most_contacts; ++i) {
     if (!(scan.gap[i] < static_cast<float>(2.0 * margin))) continue;
     const ToolShape::Point& point = shape_->points()[scan.point[i]];
@@ -257,11 +259,10 @@ void ShapeTouch::find_contacts(const Scan& scan) noexcept {
     std::optional<SeenSurface::Fit> fit = plane.fit;
     if (fit) fit->gap += fit->normal.dot(place - plane.place);
     if (!fit || fit->gap > margin || !(fit->gap > -2.0 * deepest)) continue;
+    // The body that pushes aside is left by the side that comes, not by its others.
+    if (sides > 0 && fit->wall && fit->normal.dot(sliding_side_.normal()) < 0.0) continue;
     contacts_[contact_count_++] = {lever, *fit, scan.camera[i], i};
   }
-  if (taken_in_) find_sliding_side();
-  taken_in_ = slid_ = false;
-  const std::size_t sides = sliding_side_.size(last_t_);
   for (std::size_t i = 0; i < sides; ++i) {
     const SlidingSide::Point& point = sliding_side_.point(i);
     const Vec3 lever = pose_.turn * point.at;

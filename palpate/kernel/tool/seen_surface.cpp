@@ -36,9 +36,9 @@ constexpr double going_frames = 3.5;
 constexpr float edge_spreads = 4.0F;  // [-] by which it is at its foot, in so many cells
 constexpr int foot = 6;
 constexpr int least_slid = 24;  // cells: two along a frame's way, twelve along an edge
-// Cells that are nearer by more than so many times what may strike a surface: more are an occluder.
+// Cells that are nearer by more than so many times what hides a surface: more are an occluder.
 constexpr int most_struck = 16;
-constexpr float far_strikes = 1.5F;
+constexpr float far_strikes = 1.3F;
 constexpr int rows_of_tick = 8;          // of cells that take the newest frame in
 constexpr int lag = 1;                   // [cells] by which they follow a tool late
 constexpr double longest_tick = 20e-3;   // [s] over more, nothing is smooth

@@ -27,7 +27,7 @@ progress() {
   trap '' PIPE
   while IFS= read -r line || [[ $line ]]; do
     if [[ $line =~ ^@([0-9]+)/([0-9]+)\  ]]; then
-      if ((SECONDS >= next)); then
+      if ((BASH_REMATCH[1] > 0 && SECONDS >= next)); then
         say "building ${BASH_REMATCH[1]} of ${BASH_REMATCH[2]}"
         next=$((SECONDS + 5))
       fi

@@ -590,16 +590,18 @@ TEST(ShapeTouch, IsPushedAsideByAHighBoxThatIsSeenFromAside) {
   for (const char* sensor : {"ideal", "d4xx"}) {
     Part box = part(block(Vec3(0.03, 0.04, 0.029)));
     box.world_from_part.translation() = Vec3(-0.12, 0, 0.029);
-    box.motion = {.direction = Vec3::UnitX(), .start = 3.0, .speed = 0.3};
+    box.motion = {.direction = Vec3::UnitX(), .start = 1.0, .speed = 0.3};
     Stage stage(Scene({part(HalfSpace{}), box}), "box:40x20x5mm", sensor, 0.5, 0.5);
     const HandPose at = pose({0, 0, -2.5e-3});
-    stage.press(at);
+    stage.run(1.0, [&](double t) {
+      return HandPose{at.position + std::max(0.6 - t, 0.0) * 0.1 * Vec3::UnitZ(), at.orientation};
+    });
     double in_it = 0.0, longest = 0.0, change = 0.0;
     Vec3 before = 600.0 * Vec3::UnitZ() * 5e-3;
     stage.run(
         0.4, [&](double) { return at; },
         [&](const Tick& tick) {
-          const double inside = -0.09 + 0.3 * (tick.t - 3.0) - (tick.proxy.x() - 0.02);
+          const double inside = -0.09 + 0.3 * (tick.t - 1.0) - (tick.proxy.x() - 0.02);
           in_it = inside > 0.45 * frame_time + 3e-3 ? in_it + 1e-3 : 0.0;
           longest = std::max(longest, in_it);
           change = std::max(change, (tick.force - before).norm());

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -21,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct EvalOptions {
-  std::string name, out = "eval", grid, noise = "white";
+  std::vector<std::string> names;
+  std::string out = "eval", grid, noise = "white";
   lab::ExperimentOptions given;  // but for what is checked first
   std::int64_t seed = 1;
   int jobs = 0;
@@ -76,22 +78,23 @@ int list(const EvalOptions& options) {
 
 int eval(const EvalOptions& options) {
   if (options.list_methods || options.list_experiments) return list(options);
-  if (options.name.empty())
+  if (options.names.empty())
     throw Error("eval", "no experiment is given", "see 'palpate eval --list' for their names");
-  const bool all = options.name == "all";
+  const lab::ExperimentOptions given = experiment_options(options);
   std::vector<const lab::Experiment*> experiments;
-  if (all) {
+  if (std::find(options.names.begin(), options.names.end(), "all") != options.names.end()) {
     for (const lab::Experiment& experiment : lab::known_experiments())
       experiments.push_back(&experiment);
   } else {
-    experiments.push_back(&lab::find_experiment(options.name));
+    for (const std::string& name : options.names) {
+      experiments.push_back(&lab::find_experiment(name));
+      if (given.grid && !experiments.back()->has_grid)
+        throw Error("--grid", "the experiment '" + name + "' has no grid", "leave it out");
+      if (!given.recording.empty() && !experiments.back()->takes_recording)
+        throw Error("--recording", "the experiment '" + name + "' is a simulation",
+                    "remove this option, or use real");
+    }
   }
-  const lab::ExperimentOptions given = experiment_options(options);
-  if (!all && given.grid && !experiments.front()->has_grid)
-    throw Error("--grid", "the experiment '" + options.name + "' has no grid", "leave it out");
-  if (!all && !given.recording.empty() && !experiments.front()->takes_recording)
-    throw Error("--recording", "the experiment '" + options.name + "' is a simulation",
-                "remove this option, or use real");
   lab::RunnerOptions runner;
   runner.jobs = lab::threads_of(options.jobs);
   runner.resume = options.resume;
@@ -128,7 +131,7 @@ Verb add_eval(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "eval", "run experiments: the paper's figures and claims, and the benchmark of methods");
   const auto options = std::make_shared<EvalOptions>();
-  command->add_option("experiment", options->name, "its name, or all; see --list");
+  command->add_option("experiment", options->names, "its name, several, or all; see --list");
   command->add_option("--out", options->out, "folder for CSV files and tables (eval)");
   command
       ->add_option("--methods", options->given.methods,

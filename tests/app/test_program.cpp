@@ -602,6 +602,7 @@ TEST_F(ProgramWithLab, HandsOverToTheProgramsBesideIt) {
   EXPECT_NE(run("eval --list-methods").out.find("god-object"), std::string::npos);
   EXPECT_NE(run("bench --help").out.find("--growth"), std::string::npos);
   expect_refusal("eval info", {"experiment 'info'"});  // though a verb has that name
+  expect_refusal("eval flat bund", {"did you mean 'bound'"});
 }
 
 TEST_F(Program, SuggestsTheWordThatWasMeant) {
@@ -619,6 +620,7 @@ TEST_F(Program, SuggestsTheWordThatWasMeant) {
 
 TEST_F(ProgramWithLab, RefusesRecordingsThatAnExperimentCannotTake) {
   expect_refusal("eval lift --recording tum:there", {"--recording", "lift"});
+  expect_refusal("eval real lift --recording tum:there", {"--recording", "lift"});
   expect_refusal("eval real --recording tum:nowhere", {"nowhere"});
 }
 

@@ -492,10 +492,12 @@ TEST(SeenSurface, KnowsWhereASurfaceThatComesIsWhenItsCellsBecomeCoarser) {
   SyntheticCamera camera(Scene({rising}), setup, SensorModel::named("ideal"));
   const SightParameters parameters;
   SeenSurface seen;
+  Frame frame;
   double t = 0.0;
   for (int i = 0; i < 15; ++i) {
     const double radius = i < 14 ? 0.03 : 0.08;
-    const Frame frame = camera.capture(i * frame_time, static_cast<std::uint64_t>(i));
+    const Frame before = frame;  // it lives until the next one is taken
+    frame = camera.capture(i * frame_time, static_cast<std::uint64_t>(i));
     seen.observe(*frame.cloud->image(), {Vec3::Zero(), radius}, frame.stamp, frame_time,
                  parameters);
     for (; t < (i + 0.99) * frame_time; t += 1e-3) {
@@ -597,7 +599,7 @@ TEST(ShapeTouch, IsPushedAsideByAHighBoxThatIsSeenFromAside) {
       return HandPose{at.position + std::max(0.6 - t, 0.0) * 0.1 * Vec3::UnitZ(), at.orientation};
     });
     double in_it = 0.0, longest = 0.0, change = 0.0;
-    Vec3 before = 600.0 * Vec3::UnitZ() * 5e-3;
+    Vec3 before = stiffness * 5e-3 * Vec3::UnitZ();
     stage.run(
         0.4, [&](double) { return at; },
         [&](const Tick& tick) {

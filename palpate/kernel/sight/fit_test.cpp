@@ -12,8 +12,6 @@ namespace {
 // Residuals this small are no structure, whatever the noise [detail].
 constexpr double structure_floor = 0.01;
 
-constexpr double squared(double x) { return x * x; }
-
 }  // namespace
 
 void FitTest::look(const LocalPoints& points, const Quadric& surface, const Vec2& foot, double gate,

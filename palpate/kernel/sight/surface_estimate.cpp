@@ -38,8 +38,6 @@ constexpr double same_centre = 2e-4;
 // felt.
 constexpr double hysteresis = 0.5;
 
-constexpr double squared(double x) { return x * x; }
-
 // How many standard deviations, themselves estimated with so many degrees of freedom, are exceeded
 // as rarely as `z` known ones: Student's quantile, by Fisher's expansion.
 double t_quantile(double z, double freedom) { return z + z * (z * z + 1.0) / (4.0 * freedom); }
@@ -665,13 +663,13 @@ SurfaceEstimate::Comparison SurfaceEstimate::compare(std::size_t i, std::size_t 
 }
 
 // Has a disc's noise been measured over time?
-bool SurfaceEstimate::is_measured(std::size_t rung) noexcept {
-  return scatter_[evidence(0).camera][rung].samples > static_cast<double>(upper_bounds.size());
+bool SurfaceEstimate::is_measured(std::size_t rung) const noexcept {
+  return scatter_[camera()][rung].samples > static_cast<double>(upper_bounds.size());
 }
 
 // [m^2] Until then what its points scatter counts at most: the usual noise of a camera would let a
 // wide disc agree that reaches beyond a body.
-double SurfaceEstimate::expected_variance(std::size_t rung) noexcept {
+double SurfaceEstimate::expected_variance(std::size_t rung) const noexcept {
   constexpr double unmeasured = 0.5;  // [-] of the spread
   return is_measured(rung) ? variance(rung)
                            : std::min(variance(rung), squared(unmeasured * spread_));

@@ -223,8 +223,8 @@ class SurfaceEstimate {
   [[nodiscard]] Choice choose_discs(const Discs& discs, bool learns) noexcept;
   [[nodiscard]] Comparison compare(std::size_t i, std::size_t j, const Discs& discs,
                                    bool asks_since) noexcept;
-  [[nodiscard]] bool is_measured(std::size_t rung) noexcept;
-  [[nodiscard]] double expected_variance(std::size_t rung) noexcept;
+  [[nodiscard]] bool is_measured(std::size_t rung) const noexcept;
+  [[nodiscard]] double expected_variance(std::size_t rung) const noexcept;
   void place_surface(Discs& discs, bool new_frame) noexcept;
   [[nodiscard]] bool spans_area() const noexcept;
   /// [m] of the moments.

@@ -18,6 +18,8 @@ namespace palpate {
 using Vec2 = Eigen::Vector2d;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
+constexpr double squared(double x) noexcept { return x * x; }
+
 /// Axes fixed in the world in which a piece of surface is a height z over the plane (x, y).
 struct LocalFrame {
   Vec3 origin = Vec3::Zero();  ///< [m] world

@@ -259,7 +259,7 @@ void ShapeTouch::find_contacts(const Scan& scan) noexcept {
     std::optional<SeenSurface::Fit> fit = plane.fit;
     if (fit) fit->gap += fit->normal.dot(place - plane.place);
     if (!fit || fit->gap > margin || !(fit->gap > -2.0 * deepest)) continue;
-    // The body that pushes aside is left by the side that comes, not by its others.
+    // A wall that faces the sliding side is another side of the same body.
     if (sides > 0 && fit->wall && fit->normal.dot(sliding_side_.normal()) < 0.0) continue;
     contacts_[contact_count_++] = {lever, *fit, scan.camera[i], i};
   }

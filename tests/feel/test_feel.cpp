@@ -98,6 +98,30 @@ TEST(Feel, AddsFrictionToEachMethodsForce) {
 }
 
 // Hazard: material-force
+// Presses along z, on a surface whose motion as estimated leans off z.
+class Leaning final : public Method {
+ public:
+  void seat(const Vec3& /*proxy*/) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    return {.t = t,
+            .hip = hip,
+            .normal = Vec3::UnitZ(),
+            .force = 3.0 * Vec3::UnitZ(),
+            .surface_motion = 0.06 * Vec3(0.03, 0.0, 1.0)};
+  }
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
+};
+
+TEST(Feel, DragsNoHandAsideThatASurfaceLifts) {
+  Feel feel(std::make_unique<Leaning>(), with_friction(0.6));
+  for (int i = 0; i < 1000; ++i) {
+    const double t = i * dt;
+    const Tick tick = feel.tick(Vec3(0, 0, 0.06 * t), t);
+    ASSERT_NEAR(tick.force.head<2>().norm(), 0.0, 1e-12) << t;  // [N]
+  }
+}
+
 TEST(Feel, KeepsWithinTheLimitOfTheForce) {
   Plane plane("ideal");
   Parameters parameters = with_friction(2.0);

@@ -55,17 +55,19 @@ void Feel::observe(const Observation& seen) noexcept {
   look_whether_to_feel();
 }
 
-// Depth shows no motion of a surface but that along its normal.
-Feel::Movement Feel::move(const Tick& tick) noexcept {
+// Depth shows no motion of a surface but that along its normal: what is beside the normal of the
+// force is noise, and would drag a hand that sticks.
+Feel::Movement Feel::move(const Tick& tick, const Vec3& normal) noexcept {
+  const Vec3 motion = tick.surface_motion.dot(normal) * normal;
   Movement movement;
   if (hand_.started()) {
     movement.dt = tick.t - hand_.t();
-    movement.by = tick.hip - last_hip_ - movement.dt * tick.surface_motion;
+    movement.by = tick.hip - last_hip_ - movement.dt * motion;
   }
   hand_.update(tick.hip, tick.t);
   last_hip_ = tick.hip;
-  movement.velocity = hand_.value() - tick.surface_motion;
-  approach_ += Tap::approach_share(movement.dt) * (movement.velocity - approach_);
+  movement.velocity = hand_.value() - motion;
+  approach_ += Tap::approach_share(movement.dt) * (hand_.value() - tick.surface_motion - approach_);
   return movement;
 }
 
@@ -96,15 +98,15 @@ Tick Feel::tick(const Vec3& hip, double t) noexcept { return tick(HandPose{.posi
 Tick Feel::tick(const HandPose& hand, double t) noexcept {
   Tick tick = method_->tick(hand, t);
   if (!feels_ || (tick.flags & non_finite_input) != 0) return tick;
-  const Movement movement = move(tick);
+  const double pressed = tick.force.norm();
+  const bool has_direction = pressed > undirected_force || (pressed > 0.0 && tick.normal.isZero());
+  const Vec3 normal = has_direction ? Vec3(tick.force / pressed) : tick.normal;
+  const Movement movement = move(tick, normal);
   if ((tick.flags & (free_space_released | proxy_let_go)) != 0) forget_contact();
 
-  const double pressed = tick.force.norm();
   if (pressed > 0.0)
     here_.look(clouds_, scene_, stiffness_, tick.proxy - contact_radius_ * tick.normal,
                tick.normal);
-  const bool has_direction = pressed > undirected_force || (pressed > 0.0 && tick.normal.isZero());
-  const Vec3 normal = has_direction ? Vec3(tick.force / pressed) : tick.normal;
   // As hard as the material: its spring, and its cushion.
   const Material& material = here_.material;
   const double wanted = std::min(material.stiffness / std::max(stiffness_, 1e-9), 1.0);

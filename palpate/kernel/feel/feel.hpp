@@ -42,7 +42,7 @@ class Feel final : public Method {
   void take(const Parameters& parameters) noexcept;
   void look_whether_to_feel() noexcept;
   void forget_contact() noexcept;
-  Movement move(const Tick& tick) noexcept;
+  Movement move(const Tick& tick, const Vec3& normal) noexcept;
   struct Texture {
     Vec3 force = Vec3::Zero(), vibration = Vec3::Zero();  // [N] of relief and grains; of these
   };

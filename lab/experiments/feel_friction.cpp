@@ -2,6 +2,7 @@
 // The scenes of `feel` with friction: a hand that slides, and hands that are drawn along and stick.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -91,19 +92,23 @@ FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOpti
     const std::uint64_t seed = options.seed_of(k);
     std::vector<std::vector<double>> first(contestants.size());  // [m] along, in the first second
     std::vector<std::vector<double>> last(contestants.size());
+    std::vector<bool> held(contestants.size(), false);  // does it push to the end?
     play(
         contestants, parameters,
         fmt::format("synthetic:plane?{}&stroke={}", camera_options(0.7, 0.3, "d4xx", seed), stroke),
         seconds, [&] { return in_hand(hand, grip, device, seed); },
         [&](std::size_t i, const Felt& felt) {
-          if (felt.t >= seconds - 1.0)
+          if (felt.t >= seconds - 1.0) {
             last[i].push_back(felt.hip.x());
-          else if (felt.t >= seconds - 11.0 && felt.t < seconds - 10.0)
+            held[i] = held[i] || felt.force.z() > 0.0;
+          } else if (felt.t >= seconds - 11.0 && felt.t < seconds - 10.0) {
             first[i].push_back(felt.hip.x());
+          }
         });
     for (std::size_t i = 0; i < contestants.size(); ++i)
       repeats.add({contestants[i].name, "light"}, "drift",
-                  1e3 * std::abs(mean(last[i]) - mean(first[i])));
+                  held[i] ? 1e3 * std::abs(mean(last[i]) - mean(first[i]))
+                          : std::numeric_limits<double>::infinity());
   }
   return repeats.figures({{"drift", largest}});
 }

@@ -356,6 +356,25 @@ TEST(ToolFriction, AHeldPlateDoesNotCreep) {
   }
 }
 
+// Hazard: material-force
+TEST(ToolFriction, DragsNoPlateAsideThatASurfaceLifts) {
+  // Seen from aside, so that it moves towards the camera and not along its normal alone.
+  Stage stage(make_scene(Uri("synthetic:plane?stroke=0.02")), "box:40x20x5mm", "ideal", 0.6, 0.6);
+  Parameters parameters;
+  parameters.friction.viscosity = 5.0;
+  stage.touch().set_parameters(parameters);
+  stage.press(pose({0, 0, -15e-3}));
+  stage.run(
+      1.0,
+      [](double) {
+        return pose({0, 0, -15e-3});
+      },
+      [](const Tick& tick) {
+        const double push = tick.force.dot(tick.normal);
+        EXPECT_LT((tick.force - push * tick.normal).norm(), 0.002 * push) << tick.t;
+      });
+}
+
 // One material for x < 0.
 class LeftHalf final : public MaterialMap {
  public:

@@ -138,8 +138,9 @@ function(palpate_room name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(palpate_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE})
   palpate_target_options(palpate_${name})
-  if(name MATCHES "^(drivers|record|telelink|node)$")
-    palpate_runs_once(palpate_${name})  # they wait for vendors' libraries, disks and networks
+  # No tick runs in these: they wait for files, vendors' libraries and networks.
+  if(name MATCHES "^(bag|sources|drivers|record|session|telelink|node|viewer)$")
+    palpate_runs_once(palpate_${name})
   endif()
   if(PALPATE_CLANG_TIDY AND NOT name MATCHES "^(core|paper|sight|methods|cloud)$")
     palpate_slow_when_checked(palpate_${name})  # what a tick runs stays as its users have it

@@ -262,9 +262,43 @@ void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
   statistics_.hand_over.add(nanoseconds(t - frame.put_at));
 }
 
+// What a tick knows, from stage to stage.
+struct Cycle::Now {
+  double t;  // [s]
+  HandState hand;
+  bool switched = false;   // another method
+  bool reset = false;      // latched faults
+  bool new_frame = false;  // of any camera
+  bool jumped = false;     // where the hand is in the scene has changed at once, or the scene has
+  bool reseated = false;   // the proxy
+  HandPose pose{};         // world
+  Vec3 turned = Vec3::Zero();  // [rad] world: by the handle since the tick before
+  bool holds = false;          // does a hand hold the device, that may be pushed?
+  bool may_hold = false;       // may the weight of the handle be borne?
+  Tick tick{};
+  FixtureOutput fixtures{};
+  Freshness::Age age{};
+  SafetyOutput safe{};
+  double most_force = 0.0;  // [N]
+  double support = 0.0;     // [N] of the handle's weight
+  // What was sent.
+  Vec3 force = Vec3::Zero();   // [N] world
+  Vec3 torque = Vec3::Zero();  // [N m] world
+  Wrench wrench{};             // device frame, with the weight's support
+  std::uint32_t flags = 0;     // SafetyFlag bits
+};
+
 void Cycle::run(const Wake& wake) noexcept {
-  const double t = wake.t;
-  HandState hand = device_.read(t);
+  Now now{.t = wake.t, .hand = device_.read(wake.t)};
+  adopt(now);
+  touch(now);
+  protect(now);
+  send(now);
+  keep(now, wake);
+}
+
+// What came since the tick before: commands, resets, frames.
+void Cycle::adopt(Now& now) noexcept {
   const Change* change = changes_.take();
   if (change != nullptr && change->method.get() != method_) {
     CycleState state;
@@ -273,148 +307,171 @@ void Cycle::run(const Wake& wake) noexcept {
     state.count = put.count();
     states_.push(state);
   }
-  const bool switched = change != nullptr && adopt_change(*change);
-  hand.clutched = workspace_.is_clutched(hand);
+  now.switched = change != nullptr && adopt_change(*change);
+  now.hand.clutched = workspace_.is_clutched(now.hand);
   const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
-  const bool reset = std::exchange(fault_resets_done_, resets) != resets;
-  if (reset) safety_.reset();
-  const bool new_frame = adopt_frames(switched, t);
+  now.reset = std::exchange(fault_resets_done_, resets) != resets;
+  if (now.reset) safety_.reset();
+  now.new_frame = adopt_frames(now.switched, now.t);
+  now.jumped = std::exchange(placement_changed_, false);
+}
 
-  const Vec3 hip = workspace_.hip_in_world(hand, t);
-  bool reseated = false;
-  // Where the hand is in the scene has changed at once, or the scene has: the hand is disengaged,
-  // and the proxy starts again on the free side.
-  const bool jumped = std::exchange(placement_changed_, false);
+// What the hand feels of the scene and of the fixtures. After a jump or a stall the hand is
+// disengaged, and the proxy starts again on the free side.
+void Cycle::touch(Now& now) noexcept {
+  const HandState& hand = now.hand;
+  const double t = now.t;
+  now.pose = {.position = workspace_.hip_in_world(hand, t),
+              .orientation = workspace_.orientation_in_world(hand)};
   const bool sees = !seen_.parts().empty();
-  if (sees && (safety_.stalls_at(t) || jumped)) {
-    reseated = true;
+  if (sees && (safety_.stalls_at(t) || now.jumped)) {
+    now.reseated = true;
     method_->seat(free_side(seen_, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
-  const HandPose pose{.position = hip, .orientation = workspace_.orientation_in_world(hand)};
-  const Vec3 turned = jumped || number_ == 0
-                          ? Vec3(Vec3::Zero())
-                          : rotation_vector(between(pose.orientation, last_orientation_));
-  last_orientation_ = pose.orientation;
-  const Tick tick = method_->tick(pose, t);
+  if (!now.jumped && number_ > 0)
+    now.turned = rotation_vector(between(now.pose.orientation, last_orientation_));
+  last_orientation_ = now.pose.orientation;
+  const Tick& tick = now.tick = method_->tick(now.pose, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
-  const bool holds = hand.present && !hand.clutched && !is_faulty(hand) && !jumped && !on_hold_;
-  const FixtureOutput fixtures = fixtures_.run({.t = t,
-                                                .hip = hip,
-                                                .surface_force = tick.force - tick.transient,
-                                                .surface_motion = tick.surface_motion,
-                                                .hand = holds && !safety_.stalls_at(t),
-                                                .cloud = sees ? &seen_ : nullptr,
-                                                .new_frame = new_frame});
-  workspace_.feel(tick.force + fixtures.region);
+  now.holds = hand.present && !hand.clutched && !is_faulty(hand) && !now.jumped && !on_hold_;
+  now.fixtures = fixtures_.run({.t = t,
+                                .hip = now.pose.position,
+                                .surface_force = tick.force - tick.transient,
+                                .surface_motion = tick.surface_motion,
+                                .hand = now.holds && !safety_.stalls_at(t),
+                                .cloud = sees ? &seen_ : nullptr,
+                                .new_frame = now.new_frame});
+  workspace_.feel(tick.force + now.fixtures.region);
+}
 
+// What the safety chain allows of that, and of the handle's weight.
+void Cycle::protect(Now& now) noexcept {
+  const HandState& hand = now.hand;
+  const Tick& tick = now.tick;
+  const FixtureOutput& fixtures = now.fixtures;
   const bool held = hand.present && !is_faulty(hand) && hand.position.allFinite();
   const DeviceLimits& limits = device_.info().limits;
-  const double most_force = std::min(safety_.parameters().max_force, limits.max_force);
-  const bool may_hold = held && !jumped && !on_hold_ && safety_.latched_by() == 0;
-  double support = support_.run(t, gravity * workspace_.placement().handle_weight,
-                                std::min(most_force, limits.continuous_force), may_hold);
+  now.most_force = std::min(safety_.parameters().max_force, limits.max_force);
+  now.may_hold = held && !now.jumped && !on_hold_ && safety_.latched_by() == 0;
+  now.support = support_.run(now.t, gravity * workspace_.placement().handle_weight,
+                             std::min(now.most_force, limits.continuous_force), now.may_hold);
 
-  const Freshness::Age age = freshness_.at(t);
-  const SafetyOutput safe = safety_.run(
-      {.t = t,
+  const Freshness::Age& age = now.age = freshness_.at(now.t);
+  now.safe = safety_.run(
+      {.t = now.t,
        .force = fixtures.region.isZero() ? tick.force : Vec3(fixtures.surface + tick.transient),
-       .hip = hip,
+       .hip = now.pose.position,
        .proxy = tick.proxy,
        .normal = tick.normal,
        .position = hand.position,
-       .hand = holds,
+       .hand = now.holds,
        .frame_age = age.age,
        .frame_intervals = age.intervals,
        .surface_velocity = tick.surface_velocity,
        .surface_motion = tick.surface_motion,
        .torque = tick.torque,
-       .turned = turned,
-       .held = support,
+       .turned = now.turned,
+       .held = now.support,
        .transient = tick.transient,
        .vibration = tick.vibration,
        .region = fixtures.region,
        .guidance = fixtures.guidance,
        .scale_unsure = seen_.scale_unsure()});
-  if ((safe.flags & no_support) != 0) {
+  if ((now.safe.flags & no_support) != 0) {
     support_.release();
-    support = 0.0;
+    now.support = 0.0;
   }
   // A surface's force that has yet to shrink is not added to: together they keep the limit.
-  support = std::max(std::min(support, most_force - safe.force.norm()), 0.0);
+  now.support = std::max(std::min(now.support, now.most_force - now.safe.force.norm()), 0.0);
+}
+
+// Through the last gate to the device.
+void Cycle::send(Now& now) noexcept {
+  const SafetyOutput& safe = now.safe;
+  const Freshness::Age& age = now.age;
   const Placement& placement = workspace_.placement();
   const SafetyParameters& allowed = safety_.parameters();
+  const DeviceLimits& limits = device_.info().limits;
   const Vec3 wanted = workspace_.force_in_device(safe.force);
   const Vec3 wanted_torque = workspace_.force_in_device(safe.torque);
   const double torque_share = limits.max_torque / limits.max_force;  // [m]
   const LastGate::Sent sent =
       gate_.write(device_,
-                  {.t = t,
+                  {.t = now.t,
                    .force = gate_vector(wanted),
                    .torque = gate_vector(wanted_torque),
-                   .held = gate_vector(-support * placement.down),
+                   .held = gate_vector(-now.support * placement.down),
                    .ring = safe.ring,
                    .frame_age = age.age,
                    .lost_age = allowed.lost_age,
                    .frame_intervals = age.intervals,
                    .late_intervals = allowed.late_intervals,
-                   .force_bounds = {most_force, allowed.rise_rate, allowed.fall_rate},
+                   .force_bounds = {now.most_force, allowed.rise_rate, allowed.fall_rate},
                    .torque_bounds = {limits.max_torque, torque_share * allowed.rise_rate,
                                      torque_share * allowed.fall_rate},
                    .ramp_time = allowed.ramp_time,
                    .longest_gap = allowed.stall_time,
                    .longest_time = longest_tick,
                    .engaged = (safe.flags & let_go) == 0,
-                   .hand = holds,
+                   .hand = now.holds,
                    .latched = safety_.latched_by() != 0,
-                   .may_hold = may_hold},
-                  t);
+                   .may_hold = now.may_hold},
+                  now.t);
   // In the world as it was asked for, to the bit, where the gate did nothing.
-  const Vec3 force =
+  now.force =
       sent.force == wanted ? safe.force : Vec3(placement.world_from_device.linear() * sent.force);
-  const Vec3 torque = sent.wrench.torque == wanted_torque
-                          ? safe.torque
-                          : Vec3(placement.world_from_device.linear() * sent.wrench.torque);
-  std::uint32_t flags = safe.flags;
-  if ((sent.verdict & palpate_gate_refused) != 0) flags |= output_refused;
-  if (force != safe.force || torque != safe.torque) add(statistics_.gate_cuts, 1);
+  now.torque = sent.wrench.torque == wanted_torque
+                   ? safe.torque
+                   : Vec3(placement.world_from_device.linear() * sent.wrench.torque);
+  now.wrench = sent.wrench;
+  now.flags = safe.flags;
+  if ((sent.verdict & palpate_gate_refused) != 0) now.flags |= output_refused;
+  if (now.force != safe.force || now.torque != safe.torque) add(statistics_.gate_cuts, 1);
+}
+
+// The tick for whoever reads.
+void Cycle::keep(const Now& now, const Wake& wake) noexcept {
+  const HandState& hand = now.hand;
+  const Vec3& hip = now.pose.position;
+  const Placement& placement = workspace_.placement();
   const ServoEnergy& energy =
-      passivity_.run({.t = t,
+      passivity_.run({.t = now.t,
                       .handle = placement.world_from_device.linear() * hand.position,
                       .hip = hip,
                       .scale = placement.workspace_scale,
-                      .surface = tick.surface_motion,
-                      .jumped = jumped,
-                      .sent = force,
-                      .torque = torque,
-                      .turned = turned});
+                      .surface = now.tick.surface_motion,
+                      .jumped = now.jumped,
+                      .sent = now.force,
+                      .torque = now.torque,
+                      .turned = now.turned});
 
-  Vec3 kept_out = fixtures.displacement;
-  join(tick.proxy - hip, kept_out);
-  const ServoTick record{.tick = tick,
-                         .region = fixtures.region,
-                         .guidance = fixtures.guidance,
+  Vec3 kept_out = now.fixtures.displacement;
+  join(now.tick.proxy - hip, kept_out);
+  const ServoTick record{.tick = now.tick,
+                         .region = now.fixtures.region,
+                         .guidance = now.fixtures.guidance,
                          .place = hip + kept_out,
-                         .force = force,
-                         .torque = torque,
+                         .force = now.force,
+                         .torque = now.torque,
                          .position = hand.position,
                          .handle = hand.orientation.value_or(Eigen::Quaterniond::Identity()),
-                         .gain = safe.gain,
+                         .gain = now.safe.gain,
                          .energy = energy,
                          .frame_stamp = last_stamp_,
-                         .frame_age = age.age,
+                         .frame_age = now.age.age,
                          .number = number_++,
                          .frame_number = frame_number_,
                          .settings_number = changes_.taken_last().commands.number,
-                         .safety = flags,
+                         .safety = now.flags,
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
-                         .fixtures = fixtures.acting,
-                         .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
-                                 (switched ? method_switched : 0U) | (reset ? faults_reset : 0U) |
-                                 (on_hold_ ? force_on_hold : 0U)};
+                         .fixtures = now.fixtures.acting,
+                         .hand = hand_bits(hand) | (now.reseated ? proxy_reseated : 0U) |
+                                 (now.switched ? method_switched : 0U) |
+                                 (now.reset ? faults_reset : 0U) | (on_hold_ ? force_on_hold : 0U)};
   ring_.push(record);
-  keep_statistics(record, sent.wrench);
+  keep_statistics(record, now.wrench);
 }
 
 void Cycle::keep_statistics(const ServoTick& record, const Wrench& wrench) noexcept {

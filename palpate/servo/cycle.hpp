@@ -236,6 +236,12 @@ class Cycle {
     std::shared_ptr<Method> method;
   };
 
+  struct Now;
+  void adopt(Now& now) noexcept;
+  void touch(Now& now) noexcept;
+  void protect(Now& now) noexcept;
+  void send(Now& now) noexcept;
+  void keep(const Now& now, const Wake& wake) noexcept;
   bool adopt_change(const Change& change) noexcept;
   bool adopt_frames(bool method_switched, double t) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;

@@ -126,6 +126,14 @@ double share_of(double dt, double time_constant) { return -math::expm1(-dt / tim
 // Hazard: not-a-number
 bool is_sound(const Vec3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() <= largest; }
 
+bool is_sound(const SafetyInput& input) {
+  return is_sound(input.force) && is_sound(input.normal) && is_sound(input.hip) &&
+         is_sound(input.proxy) && is_sound(input.position) &&
+         std::abs(input.surface_velocity) <= largest && is_sound(input.surface_motion) &&
+         is_sound(input.torque) && is_sound(input.turned) && is_sound(input.transient) &&
+         is_sound(input.vibration) && is_sound(input.region) && is_sound(input.guidance);
+}
+
 // Shortens `force` to `limit`; false if it is short enough.
 bool cut_to(double limit, Vec3& force) {
   const double length = force.norm();
@@ -478,16 +486,37 @@ Vec3 SafetyChain::with_transient(const SafetyInput& input, const Vec3& force,
   return sent.allFinite() ? sent : force;
 }
 
+// Force and torque as far as they may change from those of the last tick, by so much time [s] for a
+// rise and for a fall: without a clock the force falls as if a tick had passed.
+void SafetyChain::limit_change(double dt, double fall_time, Vec3& force, Vec3& torque,
+                               std::uint32_t& flags) noexcept {
+  const double rise = parameters_.rise_rate * dt;
+  if (has(slew_cut)) {
+    const Vec3 wanted = force;
+    const double fall = parameters_.fall_rate * fall_time;
+    const Vec3 wanted_torque = torque;
+    force = slewed(last_force_, wanted, rise, fall);
+    torque = slewed(last_torque_, wanted_torque, lever() * rise, lever() * fall);
+    if (force != wanted || torque != wanted_torque) flags |= slew_cut;
+  }
+  force = bounded(force, rise, flags);
+  // Nor may what rang in the last tick be made up for while a frame is late, or as the force ends.
+  if ((flags & frame_late) != 0) {
+    cut_to(last_sent_.norm(), force);
+    cut_to(last_torque_.norm(), torque);
+  }
+  if ((flags & (disengaged | fault_latched | frame_lost)) != 0 &&
+      last_sent_.squaredNorm() < last_force_.squaredNorm())
+    cut_to(std::max(last_sent_.norm() - parameters_.fall_rate * dt, 0.0), force);
+  if (has(force_cut)) cut_to(std::max(last_torque_.norm(), lever() * peak()), torque);
+  if ((flags & output_refused) != 0 || !torque.allFinite()) torque = Vec3::Zero();
+}
+
 // Hazard: not-a-number
 SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   std::uint32_t flags = 0;
   const bool in_order = std::isfinite(input.t) && (!last_t_ || input.t >= *last_t_);
-  const bool sound =
-      in_order && is_sound(input.force) && is_sound(input.normal) && is_sound(input.hip) &&
-      is_sound(input.proxy) && is_sound(input.position) &&
-      std::abs(input.surface_velocity) <= largest && is_sound(input.surface_motion) &&
-      is_sound(input.torque) && is_sound(input.turned) && is_sound(input.transient) &&
-      is_sound(input.vibration) && is_sound(input.region) && is_sound(input.guidance);
+  const bool sound = in_order && is_sound(input);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -533,28 +562,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
 
   if (scale_trust_ < 1.0) flags |= scale_unsure;
 
-  const double rise = parameters_.rise_rate * dt;
-  if (has(slew_cut)) {
-    // Without a clock the force falls as if a tick had passed.
-    const Vec3 wanted = force;
-    const double fall = parameters_.fall_rate * (in_order && last_t_ ? dt : longest_credit);
-    const Vec3 wanted_torque = torque;
-    force = slewed(last_force_, wanted, rise, fall);
-    torque = slewed(last_torque_, wanted_torque, lever() * rise, lever() * fall);
-    if (force != wanted || torque != wanted_torque) flags |= slew_cut;
-  }
-  force = bounded(force, rise, flags);
-  // Nor may what rang in the last tick be made up for while a frame is late, or as the force ends.
-  if ((flags & frame_late) != 0) {
-    cut_to(last_sent_.norm(), force);
-    cut_to(last_torque_.norm(), torque);
-  }
-  if ((flags & (disengaged | fault_latched | frame_lost)) != 0 &&
-      last_sent_.squaredNorm() < last_force_.squaredNorm())
-    cut_to(std::max(last_sent_.norm() - parameters_.fall_rate * dt, 0.0), force);
-  if (has(force_cut)) cut_to(std::max(last_torque_.norm(), lever() * peak()), torque);
-  if ((flags & output_refused) != 0 || !torque.allFinite()) torque = Vec3::Zero();
-
+  limit_change(dt, in_order && last_t_ ? dt : longest_credit, force, torque, flags);
   if (std::isfinite(input.t)) last_t_ = input.t;
   last_force_ = force;
   last_torque_ = torque;

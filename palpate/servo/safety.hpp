@@ -269,6 +269,8 @@ class SafetyChain {
   [[nodiscard]] static Vec3 slewed(const Vec3& before, const Vec3& force, double rise,
                                    double fall) noexcept;
   [[nodiscard]] Vec3 bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept;
+  void limit_change(double dt, double fall_time, Vec3& force, Vec3& torque,
+                    std::uint32_t& flags) noexcept;
   [[nodiscard]] Vec3 with_transient(const SafetyInput& input, const Vec3& force,
                                     std::uint32_t& flags) noexcept;
 

@@ -53,7 +53,7 @@ CORE_FORBIDS = {
 }
 
 # A reader of the paper follows these: no function is longer [lines].
-SHORT = re.compile(r"^palpate/kernel/(core|sight|feel|methods|cloud)/.*\.cpp$")
+SHORT = re.compile(r"^palpate/(servo|kernel/(core|sight|feel|methods|cloud))/.*\.cpp$")
 LONGEST = 60
 BODY = re.compile(r"\{\n((?:[ #][^\n]*\n|\n)*)\}\n")
 

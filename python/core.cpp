@@ -31,30 +31,6 @@ std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what, co
   return {pixels.data(), pixels.data() + pixels.size()};
 }
 
-}  // namespace
-
-std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
-                                            const std::optional<MaterialsOf>& materials,
-                                            const py::object& labels,
-                                            const py::object& brightness) {
-  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
-  if (!materials && !labels.is_none())
-    throw Error("labels", "there are no materials that they name",
-                "give materials=palpate.Materials(...)");
-  if (materials && labels.is_none() && materials->table->materials.size() > 1)
-    throw Error("materials", "nothing says which pixel is which of them",
-                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
-  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
-  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
-  return std::make_shared<LabelImage>(
-      materials ? materials->table : std::make_shared<const MaterialTable>(),
-      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
-                       : bytes_of(labels, "labels", k),
-      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
-}
-
-namespace {
-
 using namespace py::literals;
 using SharedRays = std::shared_ptr<const ViewingRays>;
 using Singles = py::array_t<float, py::array::c_style | py::array::forcecast>;
@@ -513,6 +489,26 @@ void define_renderer(py::module_& m) {
 }
 
 }  // namespace
+
+std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
+                                            const std::optional<MaterialsOf>& materials,
+                                            const py::object& labels,
+                                            const py::object& brightness) {
+  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
+  if (!materials && !labels.is_none())
+    throw Error("labels", "there are no materials that they name",
+                "give materials=palpate.Materials(...)");
+  if (materials && labels.is_none() && materials->table->materials.size() > 1)
+    throw Error("materials", "nothing says which pixel is which of them",
+                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
+  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
+  return std::make_shared<LabelImage>(
+      materials ? materials->table : std::make_shared<const MaterialTable>(),
+      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
+                       : bytes_of(labels, "labels", k),
+      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
+}
 
 void define_core(py::module_& module) {
   define_tables(module);

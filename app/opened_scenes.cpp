@@ -38,6 +38,40 @@ bool is_within(const fs::path& file, const fs::path& folder) {
   return !folder.empty() && file.string().rfind(folder.string(), 0) == 0;
 }
 
+// Empty for what no other machine can use, and for families other than IP.
+std::string ip_text(const sockaddr& address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (address.sa_family == AF_INET) {
+    const auto& ip = reinterpret_cast<const sockaddr_in&>(address).sin_addr;
+    const std::uint32_t number = ntohl(ip.s_addr);
+    if (number >> 24U == 127U || number >> 16U == 0xa9feU) return {};  // 169.254.x: link-local
+    return inet_ntop(AF_INET, &ip, text.data(), text.size());
+  }
+  if (address.sa_family == AF_INET6) {
+    const auto& ip = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
+    if (IN6_IS_ADDR_LOOPBACK(&ip) || IN6_IS_ADDR_LINKLOCAL(&ip)) return {};
+    return "[" + std::string(inet_ntop(AF_INET6, &ip, text.data(), text.size())) + "]";
+  }
+  return {};
+}
+
+// The machine's address on the way to the rest of the world; empty: there is no such way. A
+// datagram socket that is connected sends nothing.
+std::string default_address() {
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) return {};
+  sockaddr_in far{};
+  far.sin_family = AF_INET;
+  far.sin_port = htons(9);
+  far.sin_addr.s_addr = htonl(0xc0000201U);  // 192.0.2.1, for documentation: nobody has it
+  sockaddr_in own{};
+  socklen_t size = sizeof(own);
+  const bool known = connect(socket, reinterpret_cast<sockaddr*>(&far), sizeof(far)) == 0 &&
+                     getsockname(socket, reinterpret_cast<sockaddr*>(&own), &size) == 0;
+  close(socket);
+  return known ? ip_text(reinterpret_cast<const sockaddr&>(own)) : "";
+}
+
 }  // namespace
 
 std::string absolute_uri(std::string_view text) {
@@ -98,44 +132,6 @@ void OpenedScenes::save() const {
   out.close();
   if (out) fs::rename(written, file_, error);
 }
-
-namespace {
-
-// Empty for what no other machine can use, and for families other than IP.
-std::string ip_text(const sockaddr& address) {
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  if (address.sa_family == AF_INET) {
-    const auto& ip = reinterpret_cast<const sockaddr_in&>(address).sin_addr;
-    const std::uint32_t number = ntohl(ip.s_addr);
-    if (number >> 24U == 127U || number >> 16U == 0xa9feU) return {};  // 169.254.x: link-local
-    return inet_ntop(AF_INET, &ip, text.data(), text.size());
-  }
-  if (address.sa_family == AF_INET6) {
-    const auto& ip = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
-    if (IN6_IS_ADDR_LOOPBACK(&ip) || IN6_IS_ADDR_LINKLOCAL(&ip)) return {};
-    return "[" + std::string(inet_ntop(AF_INET6, &ip, text.data(), text.size())) + "]";
-  }
-  return {};
-}
-
-// The machine's address on the way to the rest of the world; empty: there is no such way. A
-// datagram socket that is connected sends nothing.
-std::string default_address() {
-  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (socket < 0) return {};
-  sockaddr_in far{};
-  far.sin_family = AF_INET;
-  far.sin_port = htons(9);
-  far.sin_addr.s_addr = htonl(0xc0000201U);  // 192.0.2.1, for documentation: nobody has it
-  sockaddr_in own{};
-  socklen_t size = sizeof(own);
-  const bool known = connect(socket, reinterpret_cast<sockaddr*>(&far), sizeof(far)) == 0 &&
-                     getsockname(socket, reinterpret_cast<sockaddr*>(&own), &size) == 0;
-  close(socket);
-  return known ? ip_text(reinterpret_cast<const sockaddr&>(own)) : "";
-}
-
-}  // namespace
 
 std::vector<std::string> reachable_addresses(std::string_view listen) {
   const bool all_families = listen == "::";

@@ -51,10 +51,8 @@ void MethodOptions::add_to(CLI::App& command) {
 }
 
 void MethodOptions::add_parameters_to(CLI::App& command) {
-  command
-      .add_option("--set", assignments_,
-                  "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")
-      ->allow_extra_args(false);
+  add_repeated(command, "--set", assignments_,
+               "set a parameter, NAME=VALUE in SI units; see `palpate parameters`");
   command.add_option("--config", config_,
                      "read the method and parameters from a session's TOML file");
 }
@@ -103,7 +101,6 @@ std::vector<CameraSpec> chosen(const std::vector<std::string>& uris,
   return cameras;
 }
 
-// A device's pose as --device-pose has it.
 Eigen::Isometry3d device_pose(const std::string& text) {
   std::error_code unused;
   if (std::filesystem::is_regular_file(text, unused))
@@ -127,7 +124,6 @@ void walk_options(SessionConfig& config, const Way& way) {
   ServerConfig::walk_keys(config.server, if_option);
 }
 
-// What the help says of a key: meaning, unit, range.
 std::string help_of(const Key& key) {
   const std::string range = key.min < key.max ? " [" + range_text(key) + "]" : "";
   return std::string(key.meaning) + range;
@@ -137,20 +133,16 @@ std::string help_of(const Key& key) {
 
 void SessionArguments::add_to(CLI::App& command) {
   command_ = &command;
-  command
-      .add_option("--camera", cameras_,
-                  "source of the frames (synthetic:desk?noise=1mm); may be given several times; "
-                  "?pose=x,y,z,qx,qy,qz,qw sets the camera pose")
-      ->allow_extra_args(false);
+  add_repeated(command, "--camera", cameras_,
+               "source of the frames (synthetic:desk?noise=1mm); may be given several times; "
+               "?pose=x,y,z,qx,qy,qz,qw sets the camera pose");
   command.add_option("--material", material_,
                      "material of the surfaces: wood or another name of `palpate parameters` for "
                      "all of them, or a TOML file that assigns materials by colour or label");
-  command
-      .add_option(
-          "--device", devices_,
-          "haptic device: mouse: on the page (the default), hand: a simulated user (the default "
-          "with --headless), script:FILE.csv a path; given several times, one hand for each")
-      ->allow_extra_args(false);
+  add_repeated(
+      command, "--device", devices_,
+      "haptic device: mouse: on the page (the default), hand: a simulated user (the default "
+      "with --headless), script:FILE.csv a path; given several times, one hand for each");
   command.add_option(
       "--device-pose", device_pose_,
       "pose of the device in the scene: x,y,z,qx,qy,qz,qw [m], or the TOML file that palpate "
@@ -169,15 +161,11 @@ void SessionArguments::add_to(CLI::App& command) {
   command.get_option("--operator-token")->envname("PALPATE_OPERATOR_TOKEN");
   command.add_flag("--no-browser", no_browser_,
                    "print the address of the page, but do not open a browser");
-  command
-      .add_option("--limit", limits_,
-                  "set a safety limit, NAME=VALUE in SI units; see `palpate parameters`")
-      ->allow_extra_args(false);
-  command
-      .add_option("--operator-limit", operator_limits_,
-                  "least strict value that the operator may set for a safety limit on the page, "
-                  "NAME=VALUE in SI units (the end of its range)")
-      ->allow_extra_args(false);
+  add_repeated(command, "--limit", limits_,
+               "set a safety limit, NAME=VALUE in SI units; see `palpate parameters`");
+  add_repeated(command, "--operator-limit", operator_limits_,
+               "least strict value that the operator may set for a safety limit on the page, "
+               "NAME=VALUE in SI units (the end of its range)");
   method_.add_to(command);
   command.get_option("--config")->description("read the session from a TOML file");
 }

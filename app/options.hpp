@@ -64,6 +64,12 @@ class SessionArguments {
   MethodOptions method_;
 };
 
+/// Adds an option that may be given several times, each with one value.
+inline CLI::Option* add_repeated(CLI::App& command, const std::string& name,
+                                 std::vector<std::string>& values, const std::string& help) {
+  return command.add_option(name, values, help)->allow_extra_args(false);
+}
+
 /// @throws UnknownMethod if no method has that name.
 void check_method(const MethodRegistry& methods, const std::string& name);
 

@@ -58,6 +58,41 @@ void introduce_device(const DeviceInfo& device, const std::string& hand,
     fmt::print(stderr, "palpate: {}: {}\n", device.uri, line);
 }
 
+// @throws Error for a duration out of range.
+SessionOptions options_of(const RunOptions& options, const SessionConfig& config) {
+  if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
+    throw Error("--duration", fmt::format("{} s is too short or too long", *options.duration),
+                "give 0.1 to 86400 s");
+  validate(config);
+  SessionOptions session;
+  static_cast<SessionSpec&>(session) = static_cast<const SessionSpec&>(config);
+  session.methods = session_methods();
+  std::string& device = session.hands.front().device;
+  if (device.empty()) device = options.headless ? "hand:" : "mouse:";
+  session.version = PALPATE_VERSION;
+  if (options.headless) {
+    if (!options.in_real_time && can_run_freely(config)) session.pace = Pace::free_running;
+    session.stroke_time = std::max(options.duration.value_or(headless_duration), 2.0);
+  }
+  return session;
+}
+
+// About a method whose ticks are not bounded.
+void warn_of_late_ticks(const Session& session) {
+  const std::string name = session.settings().method;
+  if (!session_methods().find(name).bounded)
+    fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can be late\n", name);
+}
+
+// What devices with motors are good for, and what speaks against the settings on them.
+void introduce(const Session& session, const SessionConfig& config) {
+  for (std::size_t hand = 0; hand < session.hands(); ++hand) {
+    const DeviceInfo& device = session.device(hand).info();
+    if (!device.limits.motors || device.simulated) continue;
+    introduce_device(device, session.hand_name(hand), session.settings(), config.rate);
+  }
+}
+
 }  // namespace
 
 MethodRegistry session_methods() {
@@ -84,14 +119,6 @@ bool prints_config(const RunOptions& options, const SessionConfig& config) {
   return options.print_config;
 }
 
-void introduce(const Session& session, const SessionConfig& config) {
-  for (std::size_t hand = 0; hand < session.hands(); ++hand) {
-    const DeviceInfo& device = session.device(hand).info();
-    if (!device.limits.motors || device.simulated) continue;
-    introduce_device(device, session.hand_name(hand), session.settings(), config.rate);
-  }
-}
-
 GuardedDevices guarded_devices(const SessionConfig& config) {
   GuardedDevices devices;
   for (const HandSpec& hand : config.hands)
@@ -107,29 +134,22 @@ std::unique_ptr<Device> guarded_device(const std::string& uri) {
   return open_guarded([&] { return driver->open_device(Uri(uri)); });
 }
 
-SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
-                          MethodRegistry methods) {
-  if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
-    throw Error("--duration", fmt::format("{} s is too short or too long", *options.duration),
-                "give 0.1 to 86400 s");
-  validate(config);
-  SessionOptions session;
-  static_cast<SessionSpec&>(session) = static_cast<const SessionSpec&>(config);
-  session.methods = std::move(methods);
-  std::string& device = session.hands.front().device;
-  if (device.empty()) device = options.headless ? "hand:" : "mouse:";
-  session.version = PALPATE_VERSION;
-  if (options.headless) {
-    if (!options.in_real_time && can_run_freely(config)) session.pace = Pace::free_running;
-    session.stroke_time = std::max(options.duration.value_or(headless_duration), 2.0);
-  }
-  return session;
-}
-
-std::string late_ticks(const SessionOptions& options) {
-  const std::string& name = options.method;
-  if (options.methods.find(name).bounded) return {};
-  return fmt::format("palpate: {} is a method of the lab: its ticks can be late\n", name);
+OpenedSession::OpenedSession(const RunOptions& options, const SessionConfig& config,
+                             GuardedDevices guarded, Running& running,
+                             std::function<void(std::size_t, const FedFrame&)> on_frame,
+                             bool is_first)
+    : session([&] {
+        SessionOptions wanted = options_of(options, config);
+        wanted.open_devices = std::move(guarded);
+        wanted.on_frame = std::move(on_frame);
+        if (options.beside.prepare) options.beside.prepare(wanted);
+        return wanted;
+      }()),
+      announced{running} {
+  if (is_first) warn_of_late_ticks(session);
+  running.session = &session;
+  introduce(session, config);
+  if (!running.ended && options.beside.attach) beside = options.beside.attach(session);
 }
 
 int finish(Session& session, bool json, const std::string& ended) {

@@ -18,8 +18,6 @@
 
 namespace palpate::app {
 
-// What the verbs that run a session share.
-
 /// What a verb has beside its session. Each may be empty.
 struct Beside {
   std::function<void(SessionOptions&)> prepare;  ///< before the session is made
@@ -54,10 +52,6 @@ MethodRegistry session_methods();
 /// Prints the session as a TOML file where --print-config asks for it. @return does it?
 bool prints_config(const RunOptions& options, const SessionConfig& config);
 
-/// @throws Error for a duration out of range.
-SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
-                          MethodRegistry methods);
-
 /// A device whose motors would keep their force if this process died, in a process of its own; null
 /// for any other. Only while this process has one thread.
 std::unique_ptr<Device> guarded_device(const std::string& uri);
@@ -65,12 +59,6 @@ std::unique_ptr<Device> guarded_device(const std::string& uri);
 /// That of each hand; null, too, where the user wants none (--without-watchdog).
 using GuardedDevices = std::vector<std::unique_ptr<Device>>;
 GuardedDevices guarded_devices(const SessionConfig& config);
-
-/// A line about a method whose ticks are not bounded; empty for any other.
-std::string late_ticks(const SessionOptions& options);
-
-/// Says what a device with motors is good for, and what speaks against the settings on it.
-void introduce(const Session& session, const SessionConfig& config);
 
 /// What the signals that end the program have to do with its session.
 struct Running {
@@ -81,6 +69,25 @@ struct Running {
     ended = true;
     if (Session* now = session) now->request_stop();
   }
+};
+
+/// A session as the verbs want it: opens it, and says what there is to say of its method and of its
+/// devices with motors. Unless a signal has come meanwhile, the verb's `beside` is attached.
+struct OpenedSession {
+  /// @param is_first  of this program; of others nothing is said of the method
+  /// @throws Error for a duration out of range, or as Session
+  OpenedSession(const RunOptions& options, const SessionConfig& config, GuardedDevices guarded,
+                Running& running,
+                std::function<void(std::size_t, const FedFrame&)> on_frame = nullptr,
+                bool is_first = true);
+
+  struct Announced {
+    Running& running;
+    ~Announced() { running.session = nullptr; }
+  };
+  Session session;
+  Announced announced;
+  std::shared_ptr<void> beside;
 };
 
 /// A session with its page, or without one; prints what there is to say.

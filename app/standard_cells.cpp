@@ -3,7 +3,6 @@
 
 #include "app/program_robots.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
-#include "palpate/kernel/core/error.hpp"
 #include "palpate/net/telelink/robots.hpp"
 
 namespace palpate::app {

@@ -7,9 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "palpate/servo/periodic_thread.hpp"
-#include "palpate/session/camera_feed.hpp"
 #include "palpate/session/session.hpp"
-#include "palpate/session/summary.hpp"
 
 namespace palpate::app {
 

@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "app/options.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -37,7 +37,6 @@ struct CalibrateOptions {
   bool json = false;
 };
 
-// A point to touch, and what it is called.
 struct Target {
   std::string name;
   Vec3 world;
@@ -45,11 +44,6 @@ struct Target {
 
 std::string text_of_point(const Vec3& v) {
   return fmt::format("{:+.4f} {:+.4f} {:+.4f} m", v.x(), v.y(), v.z());
-}
-
-std::string read_text(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 // Replaces a file as a whole, so that a power cut leaves the old or the new one.
@@ -240,7 +234,8 @@ int calibrate(const CalibrateOptions& options) {
   std::fflush(stdout);
   check_residuals(fit, options.max_residual);
   if (options.out) {
-    const std::string text = exists ? read_text(*options.out) : std::string();
+    constexpr std::uintmax_t largest_file = 1U << 24U;  // [bytes]
+    const std::string text = exists ? read_text(*options.out, largest_file) : std::string();
     write_text(*options.out, with_placement(text, *options.out, fit.placement));
     fmt::print(stderr, "palpate: written to {}; use it with palpate run --config {}\n",
                *options.out, *options.out);
@@ -266,10 +261,8 @@ Verb add_calibrate(CLI::App& program) {
   command->add_option("--device", options->device,
                       "the device that touches the points; it gets no force");
   command->add_option("--camera", options->camera, "the camera that sees them");
-  command
-      ->add_option("--at", options->pixels,
-                   "a pixel of the camera's first frame, U,V; three or more, touched in this order")
-      ->allow_extra_args(false);
+  add_repeated(*command, "--at", options->pixels,
+               "a pixel of the camera's first frame, U,V; three or more, touched in this order");
   command->add_option("--points", options->points,
                       "instead of --at: CSV of points in the scene, x,y,z in m");
   command->add_option("--pairs", options->pairs,

@@ -136,6 +136,18 @@ Json describe_pixel(const Cloud& cloud, const std::string& text, const std::stri
               "remove --at, or use a source of depth images");
 }
 
+void print(const Json& object, const std::string& indent) {
+  for (const auto& [key, value] : object.items()) {
+    if (value.is_object()) {
+      fmt::print("{}{}:\n", indent, key);
+      print(value, indent + "  ");
+    } else {
+      fmt::print("{}{}: {}\n", indent, key,
+                 value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+}
+
 int info(InfoOptions options) {
   if (options.uri.empty())
     throw Error(
@@ -183,20 +195,7 @@ int info(InfoOptions options) {
     fmt::print("{}\n", json.dump(2));
     return 0;
   }
-  const auto print = [](const Json& object, const char* indent) {
-    for (const auto& [key, value] : object.items()) {
-      if (!value.is_object())
-        fmt::print("{}{}: {}\n", indent, key,
-                   value.is_string() ? value.get<std::string>() : value.dump());
-    }
-  };
   print(json, "");
-  fmt::print("first_frame:\n");
-  print(json["first_frame"], "  ");
-  if (json.contains("at")) {
-    fmt::print("at:\n");
-    print(json["at"], "  ");
-  }
   return 0;
 }
 

@@ -27,13 +27,8 @@ int run_node(const RosOptions& options) {
   GuardedDevices guarded = guarded_devices(config);
   Running running;
   const EndingSignals signals([&] { running.end(); });
-  SessionOptions wanted = options_of(options.run, config, session_methods());
-  wanted.open_devices = std::move(guarded);
-  const std::string warning = late_ticks(wanted);
-  Session session(std::move(wanted));
-  std::fputs(warning.c_str(), stderr);
-  running.session = &session;
-  introduce(session, config);
+  OpenedSession opened(options.run, config, std::move(guarded), running);
+  Session& session = opened.session;
   RosNodeOptions wishes = options.node;
   wishes.recordings.folder = config.record_folder;
   wishes.recordings.limit = 1e9 * config.record_limit;
@@ -47,7 +42,6 @@ int run_node(const RosOptions& options) {
     if (const std::string trouble = node->trouble(); !trouble.empty())
       fmt::print(stderr, "palpate: {}\n", trouble);
   }
-  running.session = nullptr;
   return finish(session, options.run.json, ended_recording);
 }
 

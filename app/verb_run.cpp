@@ -111,25 +111,18 @@ void say_of_points(const Cloud& cloud, Session& session, const SessionConfig& co
 
 int run_headless(const RunOptions& options, const SessionConfig& config, GuardedDevices guarded,
                  Running& running) {
-  SessionOptions wanted = options_of(options, config, session_methods());
-  wanted.open_devices = std::move(guarded);
-  if (options.beside.prepare) options.beside.prepare(wanted);
-  const std::string warning = late_ticks(wanted);
-  const bool is_free = wanted.pace == Pace::free_running;
-  Session session(std::move(wanted));
-  std::fputs(warning.c_str(), stderr);
-  running.session = &session;
-  introduce(session, config);
+  OpenedSession opened(options, config, std::move(guarded), running);
+  Session& session = opened.session;
   if (running.ended) return finish(session, options.json);
-  std::shared_ptr<void> beside;
-  if (options.beside.attach) beside = options.beside.attach(session);
+  bool is_shown = false;
   const bool watched = isatty(STDERR_FILENO) == 1;
   const auto ticks_a_line = static_cast<std::uint64_t>(std::max(config.rate / 10.0, 1.0));
   session.run(options.duration.value_or(headless_duration), [&](const ServoTick& record) {
-    if (watched && is_free && record.number % ticks_a_line == 0) show_status(record);
+    if (!watched || record.number % ticks_a_line != 0) return;
+    is_shown = true;
+    show_status(record);
   });
-  if (watched && is_free) fmt::print(stderr, "\n");
-  running.session = nullptr;
+  if (is_shown) fmt::print(stderr, "\n");
   if (const auto seen = session.newest_clouds().front()) say_of_points(*seen, session, config);
   return finish(session, options.json);
 }
@@ -180,24 +173,11 @@ Ending run_page(const RunOptions& options, SessionConfig& config, GuardedDevices
     if (Session* now = running.session) now->request_stop();
   };
   SessionHost host(PALPATE_VERSION, std::move(rules));
-  SessionOptions wanted = options_of(options, config, session_methods());
-  wanted.open_devices = std::move(guarded);
-  wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
-    host.show(camera, frame);
-  };
-  if (options.beside.prepare) options.beside.prepare(wanted);
-  const std::string warning = is_first ? late_ticks(wanted) : "";
-  Session session(std::move(wanted));
-  std::fputs(warning.c_str(), stderr);
-  struct Over {
-    Running& running;
-    ~Over() { running.session = nullptr; }
-  } const over{running};
-  running.session = &session;
-  introduce(session, config);
+  OpenedSession opened(
+      options, config, std::move(guarded), running,
+      [&host](std::size_t camera, const FedFrame& frame) { host.show(camera, frame); }, is_first);
+  Session& session = opened.session;
   if (running.ended) return {.status = finish(session, options.json)};
-  std::shared_ptr<void> beside;
-  if (options.beside.attach) beside = options.beside.attach(session);
   std::string ended_recording;
   session.start();
   if (is_first) {

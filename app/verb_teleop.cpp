@@ -20,7 +20,6 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/telelink/operator_end.hpp"
 #include "palpate/net/telelink/robot_end.hpp"
-#include "palpate/net/telelink/robots.hpp"
 
 namespace palpate::app {
 namespace {

@@ -231,11 +231,9 @@ Verb add_trace(CLI::App& program) {
       "trace",
       "run a HIP path or a press over a source, and write a CSV of ticks; exactly repeatable");
   const auto options = std::make_shared<TraceOptions>();
-  command
-      ->add_option("--camera", options->cameras,
-                   "source of the frames, e.g. tum:DIR; may be given several times")
-      ->required()
-      ->allow_extra_args(false);
+  add_repeated(*command, "--camera", options->cameras,
+               "source of the frames, e.g. tum:DIR; may be given several times")
+      ->required();
   command->add_option("--material", options->material,
                       "material of its surfaces, such as wood, or a TOML file");
   command->add_option("--path", options->path,

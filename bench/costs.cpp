@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <functional>
 
 #include "palpate/kernel/cloud/depth_image.hpp"
@@ -16,6 +17,49 @@
 namespace palpate::bench {
 namespace {
 
+// What the samples [us] say; `batch` is passed on.
+Distribution distribution(std::vector<double> samples, std::size_t batch) {
+  if (samples.empty()) return {};
+  std::sort(samples.begin(), samples.end());
+  const auto at = [&samples](double part) {
+    return samples[static_cast<std::size_t>(part * static_cast<double>(samples.size() - 1))];
+  };
+  return {at(0.5), at(0.99), at(0.999), samples.back(), samples.size(), batch};
+}
+
+// What reading the thread's clock costs [us]: the median of many.
+double clock_cost() {
+  static const double cost = [] {
+    std::vector<double> costs(2001);
+    for (double& each : costs) {
+      const double begin = thread_time();
+      each = thread_time() - begin;
+    }
+    return distribution(costs, 1).median;
+  }();
+  return cost;
+}
+
+// Calls `operation` over and over for about `budget` seconds of thread time, at least five times
+// `batch`. Its times are means over `batch` calls, less the clock's own cost: take a batch for what
+// is shorter than that.
+Distribution measure(double budget, std::size_t batch, const std::function<void()>& operation) {
+  constexpr std::size_t fewest = 5;
+  constexpr std::size_t most = 200000;
+  const double cost = clock_cost();
+  std::vector<double> samples;
+  samples.reserve(most);
+  const double end = thread_time() + budget * 1e6;
+  while (samples.size() < most) {
+    const double begin = thread_time();
+    if (begin > end && samples.size() >= fewest) break;
+    for (std::size_t i = 0; i < batch; ++i) operation();
+    const double taken = std::max(thread_time() - begin - cost, 0.0);
+    samples.push_back(taken / static_cast<double>(batch));
+  }
+  return distribution(std::move(samples), batch);
+}
+
 // Keeps the compiler from dropping a result.
 template <class T>
 void use(const T& value) {
@@ -25,7 +69,6 @@ void use(const T& value) {
 // How many calls go into a sample of something that takes a fraction of a microsecond.
 constexpr std::size_t many = 64;
 
-// A cloud that counts.
 class CountedCloud final : public Cloud {
  public:
   explicit CountedCloud(const Cloud& cloud) : cloud_(&cloud) {}
@@ -63,7 +106,6 @@ class Session {
     for (int i = 0; i < settling; ++i) touch->tick(start, 0.0);
   }
 
-  // Is there a new frame for the next tick?
   [[nodiscard]] bool frame_is_due() const {
     return static_cast<double>(frames_) <= (now() + 1.0 / hand_.tick_rate) * hand_.frame_rate;
   }
@@ -133,6 +175,12 @@ void measure_ticks(const Subject& subject, const MethodChoice& method, const Han
 }
 
 }  // namespace
+
+double thread_time() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
+}
 
 KernelCosts kernel_costs(const Subject& subject, const MethodChoice& method, const Hand& hand,
                          double budget) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,9 +9,19 @@
 #include "palpate/kernel/core/parameters.hpp"
 
 #include "bench/subject.hpp"
-#include "bench/timing.hpp"
 
 namespace palpate::bench {
+
+/// How long something took, over many times [us].
+struct Distribution {
+  double median = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
+  std::size_t samples = 0;  ///< each the mean of `batch` calls
+  std::size_t batch = 1;
+};
+
+/// The processor time of the calling thread [us]. Others' work does not count, but their wear on
+/// caches does.
+double thread_time();
 
 /// How a hand moves while ticks are measured.
 struct Hand {

@@ -59,7 +59,6 @@ class StraightLoop final : public TouchLoop {
 
   void frame(const std::shared_ptr<const Cloud>& cloud, double stamp, double /*t*/) override {
     method_->observe({*cloud, stamp});
-    in_use_ = cloud;  // only now may the frame before go
   }
 
   Felt tick(double t) override {
@@ -75,7 +74,6 @@ class StraightLoop final : public TouchLoop {
  private:
   std::unique_ptr<Method> method_;
   HeldDevice held_;
-  std::shared_ptr<const Cloud> in_use_;
 };
 
 class SafeLoop final : public TouchLoop {
@@ -155,16 +153,15 @@ std::unique_ptr<TouchLoop> safe_loop(std::unique_ptr<Method> method, HeldDevice 
 
 void play_to(const std::vector<std::unique_ptr<TouchLoop>>& loops, const Scenario& scenario,
              const std::function<void(std::size_t loop, const Felt&)>& on_tick) {
-  Arrivals arrivals(scenario);
-  const auto ticks =
-      static_cast<std::int64_t>(std::llround(scenario.duration * scenario.tick_rate));
-  for (std::int64_t i = 0; i <= ticks; ++i) {
-    const double t = static_cast<double>(i) / scenario.tick_rate;
-    arrivals.until(t, [&](const std::shared_ptr<const Cloud>& cloud, double stamp) {
-      for (const auto& loop : loops) loop->frame(cloud, stamp, t);
-    });
-    for (std::size_t k = 0; k < loops.size(); ++k) on_tick(k, loops[k]->tick(t));
-  }
+  run(
+      scenario,
+      [&](const std::shared_ptr<const Cloud>& cloud, double stamp, double t) {
+        for (const auto& loop : loops) loop->frame(cloud, stamp, t);
+      },
+      [&](double t) {
+        for (std::size_t k = 0; k < loops.size(); ++k) on_tick(k, loops[k]->tick(t));
+        return true;
+      });
 }
 
 }  // namespace palpate::lab

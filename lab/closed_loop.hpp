@@ -55,7 +55,7 @@ struct Felt {
 class TouchLoop {
  public:
   virtual ~TouchLoop() = default;
-  /// A frame arrives. @param stamp  [s] of its capture @param t  [s] now
+  /// A frame arrives, and lives until the next. @param stamp  [s] of its capture @param t  [s] now
   virtual void frame(const std::shared_ptr<const Cloud>& cloud, double stamp, double t) = 0;
   virtual Felt tick(double t) = 0;
 };

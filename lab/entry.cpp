@@ -95,13 +95,10 @@ void plan_pop(const EntryOptions& options, Plan& plan) {
 // A scene gives an object of its measures, in the order of their table.
 void plan_fidelity(const EntryOptions& options, Plan& plan) {
   const Experiment& fidelity = find_experiment("fidelity");
-  std::vector<std::string> scenes;
-  for (const FidelityMeasure& measure : fidelity_measures()) {
-    if (scenes.empty() || scenes.back() != measure.scene) scenes.emplace_back(measure.scene);
-  }
   for (int part = 0; part < parts; ++part) {
-    for (const std::string& scene : scenes) {
-      if (part > 0 && is_without_chance(scene)) continue;
+    for (const std::string_view of : fidelity_scenes()) {
+      if (part > 0 && is_without_chance(of)) continue;
+      const std::string scene(of);
       ExperimentOptions given = experiment_options(options);
       given.families = {scene};
       given.seed = options.seed * parts + static_cast<std::uint64_t>(part);
@@ -205,7 +202,6 @@ std::vector<double> aims_met(const Json& parts) {
   return shares;
 }
 
-// The part "scores" of an entry, from its part "outcomes".
 Json scores_of(const Json& outcomes) {
   std::vector<Interval> held;
   std::vector<Interval> right;
@@ -312,49 +308,6 @@ std::string summary_of(const EntryOptions& options) {
   return kind_of(options) == "lab" ? methods().find(options.method).summary : "";
 }
 
-}  // namespace
-
-std::string make_entry(const EntryOptions& options, const EntryRun& run,
-                       const RunnerOptions& runner, const fs::path& file) {
-  const double began = processor_seconds();
-  Json entry;
-  entry["palpate_entry"] = format_version;
-  entry["method"] = options.method;
-  entry["kind"] = kind_of(options);
-  entry["summary"] = summary_of(options);
-  const Plan plan = plan_of(renamed(options));
-  std::vector<const Item*> items;
-  for (const Item& item : plan.items) items.push_back(&item);
-  const std::string cases_hash = hash_of_cases(plan);
-  const std::string rows = run_cells(
-      cells_of(items), "palpate entry of " + options.method + " " + cases_hash, runner, file);
-  const double cost = processor_seconds() - began;
-
-  const Json outcomes = outcomes_of(plan, lines_of(rows));
-  entry["command"] = command_of(options);
-  entry["version"] = PALPATE_VERSION;
-  entry["seed"] = options.seed;
-  entry["cases"] = options.cases;
-  entry["repeats"] = options.repeats;
-  entry["cases_sha256"] = cases_hash;
-  entry["recordings"] = Json::array();
-  for (const auto& [name, cases] : plan.recordings)
-    entry["recordings"].push_back(
-        {{"name", name}, {"frames", cases.frames}, {"sha256", cases.hash}});
-  entry["scores"] = scores_of(outcomes);
-  entry["outcomes"] = outcomes;
-  Json said = Json::object();
-  for (const auto& [key, value] : run) said[key] = value;
-  said["threads"] = runner.jobs;
-  said["cpu_seconds"] = std::round(10.0 * cost) / 10.0;
-  entry["run"] = said;
-  std::string text = entry.dump(1) + "\n";
-  write_file(file, text);
-  return text;
-}
-
-namespace {
-
 Json read_entry(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in)
@@ -387,7 +340,6 @@ std::vector<std::string> recordings_of(const Json& entry, const std::vector<std:
   return check.left_out.empty() ? found : std::vector<std::string>();
 }
 
-// Are the measures of a scene the same, but for rounding?
 bool same_measures(const Json& a, const Json& b) {
   for (const auto& [name, value] : a.items()) {
     if (!b.contains(name)) return false;
@@ -479,6 +431,45 @@ EntryCheck check_parsed(const Json& entry, std::size_t sample, std::uint64_t cha
 }
 
 }  // namespace
+
+std::string make_entry(const EntryOptions& options, const EntryRun& run,
+                       const RunnerOptions& runner, const fs::path& file) {
+  const double began = processor_seconds();
+  Json entry;
+  entry["palpate_entry"] = format_version;
+  entry["method"] = options.method;
+  entry["kind"] = kind_of(options);
+  entry["summary"] = summary_of(options);
+  const Plan plan = plan_of(renamed(options));
+  std::vector<const Item*> items;
+  for (const Item& item : plan.items) items.push_back(&item);
+  const std::string cases_hash = hash_of_cases(plan);
+  const std::string rows = run_cells(
+      cells_of(items), "palpate entry of " + options.method + " " + cases_hash, runner, file);
+  const double cost = processor_seconds() - began;
+
+  const Json outcomes = outcomes_of(plan, lines_of(rows));
+  entry["command"] = command_of(options);
+  entry["version"] = PALPATE_VERSION;
+  entry["seed"] = options.seed;
+  entry["cases"] = options.cases;
+  entry["repeats"] = options.repeats;
+  entry["cases_sha256"] = cases_hash;
+  entry["recordings"] = Json::array();
+  for (const auto& [name, cases] : plan.recordings)
+    entry["recordings"].push_back(
+        {{"name", name}, {"frames", cases.frames}, {"sha256", cases.hash}});
+  entry["scores"] = scores_of(outcomes);
+  entry["outcomes"] = outcomes;
+  Json said = Json::object();
+  for (const auto& [key, value] : run) said[key] = value;
+  said["threads"] = runner.jobs;
+  said["cpu_seconds"] = std::round(10.0 * cost) / 10.0;
+  entry["run"] = said;
+  std::string text = entry.dump(1) + "\n";
+  write_file(file, text);
+  return text;
+}
 
 EntryCheck check_entry(const fs::path& file, std::size_t sample, std::uint64_t chance,
                        const std::vector<std::string>& recordings,

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/experiment.hpp"
 
-#include <utility>
-
 #include <fmt/format.h>
 
-#include "lab/method.hpp"
 #include "lab/pipe_method.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "palpate/io/sources/sensor_model.hpp"
@@ -31,24 +30,16 @@ void add_correlated_noise(std::vector<Vec3>& points, int columns, int rows, doub
   std::vector<float> white(static_cast<std::size_t>(wide) * tall);
   fill_normal(key, white);
   std::vector<float> smoothed(static_cast<std::size_t>(columns) * tall);
-  for (int v = 0; v < tall; ++v) {
-    for (int u = 0; u < columns; ++u) {
-      float sum = 0.0F;
-      for (int d = 0; d <= 2 * half; ++d)
-        sum +=
-            kernel[static_cast<std::size_t>(d)] * white[static_cast<std::size_t>(v) * wide + u + d];
-      smoothed[static_cast<std::size_t>(v) * columns + u] = sum;
-    }
+  const auto convolved = [&](const std::vector<float>& values, std::size_t at, int step) {
+    float sum = 0.0F;
+    for (std::size_t d = 0; d < kernel.size(); ++d) sum += kernel[d] * values[at + d * step];
+    return sum;
+  };
+  for (std::size_t v = 0; v < static_cast<std::size_t>(tall); ++v) {
+    for (int u = 0; u < columns; ++u) smoothed[v * columns + u] = convolved(white, v * wide + u, 1);
   }
-  for (int v = 0; v < rows; ++v) {
-    for (int u = 0; u < columns; ++u) {
-      float sum = 0.0F;
-      for (int d = 0; d <= 2 * half; ++d)
-        sum += kernel[static_cast<std::size_t>(d)] *
-               smoothed[static_cast<std::size_t>(v + d) * columns + u];
-      points[static_cast<std::size_t>(v) * columns + u].z() += sigma * double{sum};
-    }
-  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i].z() += sigma * double{convolved(smoothed, i, columns)};
 }
 
 }  // namespace

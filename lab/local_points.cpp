@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/local_points.hpp"
 
-#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "palpate/kernel/cloud/point_cloud.hpp"
@@ -27,30 +27,26 @@ bool LocalPoints::cover(const Vec3& place) {
   stale_ = false;
   centre_ = place;
   newest_.clear();
+  points_.clear();
   normals_.clear();
-  const PointCloud* given = cloud_->point_cloud();
-  if (window_ == 1 && given != nullptr && given->surface() != nullptr &&
-      !given->surface()->normals.empty()) {
-    const Surface& surface = *given->surface();
+  const PointCloud* given = window_ == 1 ? cloud_->point_cloud() : nullptr;
+  const Surface* surface = given != nullptr ? given->surface() : nullptr;
+  if (surface != nullptr && !surface->normals.empty()) {
     viewpoint_ = given->viewpoint();
-    points_.clear();
-    for (std::size_t i = 0; i < surface.points.size(); ++i) {
-      if (!((surface.points[i] - place).norm() <= reach_)) continue;
-      points_.push_back(surface.points[i]);
-      normals_.push_back(surface.normals[i]);
+    for (std::size_t i = 0; i < surface->points.size(); ++i) {
+      if (!((surface->points[i] - place).norm() <= reach_)) continue;
+      points_.push_back(surface->points[i]);
+      normals_.push_back(surface->normals[i]);
     }
-    tree_ = points_.empty() ? nullptr : std::make_unique<KdTree>(points_);
-    return true;
-  }
-  gather(*cloud_, Ball{place, reach_}, patch_);
-  for (std::size_t i = 0; i < patch_.size(); ++i)
-    newest_.emplace_back(place + Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
-  viewpoint_ = patch_.view_count() > 0 ? patch_.view(0).viewpoint : std::nullopt;
-  points_ = newest_;
-  for (const std::vector<Vec3>& frame : before_) {
-    for (const Vec3& point : frame) {
-      if ((point - place).norm() <= reach_) points_.push_back(point);
-    }
+  } else {
+    gather(*cloud_, Ball{place, reach_}, patch_);
+    for (std::size_t i = 0; i < patch_.size(); ++i)
+      newest_.emplace_back(place + Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    viewpoint_ = patch_.view_count() > 0 ? patch_.view(0).viewpoint : std::nullopt;
+    points_ = newest_;
+    for (const std::vector<Vec3>& frame : before_)
+      std::copy_if(frame.begin(), frame.end(), std::back_inserter(points_),
+                   [&](const Vec3& point) { return (point - place).norm() <= reach_; });
   }
   tree_ = points_.empty() ? nullptr : std::make_unique<KdTree>(points_);
   return true;
@@ -82,9 +78,7 @@ std::optional<Contact> fit_plane(const Patch& patch, double radius) {
   mean /= total;
   Vec3 normal = axes_of(second / total - mean * mean.transpose()).vectors.col(0);
   const Vec3 at = patch.ball().centre + mean;
-  const auto& seen_from = patch.view(0).viewpoint;
-  const Vec3 outward = seen_from ? Vec3(*seen_from - at) : Vec3(Vec3::UnitZ());
-  if (normal.dot(outward) < 0.0) normal = -normal;
+  if (normal.dot(towards_viewer(patch.view(0).viewpoint, at)) < 0.0) normal = -normal;
   return Contact{at, normal};
 }
 

@@ -60,6 +60,8 @@ class LabMethod : public Method {
     parameters_ = parameters;
     parameters_changed();
   }
+  /// A tick cannot throw, so `play` asks after each. @throws what went wrong first, if anything did
+  virtual void rethrow() const {}
 
  protected:
   explicit LabMethod(const Parameters& parameters) : parameters_(parameters) {}
@@ -90,14 +92,6 @@ template <class M, auto... more>
 std::unique_ptr<Method> made(const Parameters& parameters) {
   return std::make_unique<M>(parameters, more...);
 }
-
-/// A method that can fail in its ticks, which cannot throw: `play` asks after each.
-class FallibleMethod {
- public:
-  virtual ~FallibleMethod() = default;
-  /// @throws what went wrong first, if anything did.
-  virtual void rethrow() const = 0;
-};
 
 /// What a method is made from.
 struct MethodSetup {

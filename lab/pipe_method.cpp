@@ -251,7 +251,7 @@ Message message_of(const std::string& name, const Cloud& cloud, double stamp) {
               "use scenes with one camera");
 }
 
-class PipeMethod final : public LabMethod, public FallibleMethod {
+class PipeMethod final : public LabMethod {
  public:
   PipeMethod(std::string_view name, const Parameters& parameters,
              std::chrono::milliseconds patience)

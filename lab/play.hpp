@@ -35,52 +35,46 @@ struct Scenario {
   std::function<std::optional<double>(std::uint64_t frame)> delay = nullptr;
 };
 
-/// The frames of a scenario as they arrive: each at the first tick at or after that, in order.
-class Arrivals {
- public:
-  /// @param scenario  must outlive this
-  explicit Arrivals(const Scenario& scenario) : scenario_(scenario) {}
-
-  /// Hands over the frames that have arrived by `t` [s] since the last call.
-  /// @param on_frame  (const std::shared_ptr<const Cloud>&, double stamp)
-  template <class OnFrame>
-  void until(double t, const OnFrame& on_frame) {
-    for (;;) {
-      const double stamp = static_cast<double>(next_frame_) / scenario_.frame_rate;
-      const std::optional<double> delay = scenario_.delay ? scenario_.delay(next_frame_) : 0.0;
-      if (stamp + delay.value_or(0.0) > t + 1e-9) return;
-      if (delay) {
-        std::shared_ptr<const Cloud> cloud = scenario_.cloud(next_frame_, stamp);
-        on_frame(cloud, stamp);
-        in_use_ = std::move(cloud);  // only now may the frame before go
-      }
-      ++next_frame_;
-    }
-  }
-
- private:
-  const Scenario& scenario_;
-  std::uint64_t next_frame_ = 0;
-  std::shared_ptr<const Cloud> in_use_;
-};
-
-/// Plays a scenario to a method: every frame at the first tick at or after it arrives, in order.
-/// @param on_tick  (const Tick&) -> bool, after each tick: continue?
-template <class OnTick>
-void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
-  Arrivals arrivals(scenario);
-  const auto* fallible = dynamic_cast<const FallibleMethod*>(&method);
+/// Runs a scenario: each frame at the first tick at or after it arrives, in order.
+/// @param on_frame  (const std::shared_ptr<const Cloud>&, double stamp, double t) when one arrives;
+///                  it lives until the next
+/// @param on_tick   (double t) -> bool, at each tick: continue?
+template <class OnFrame, class OnTick>
+void run(const Scenario& scenario, const OnFrame& on_frame, const OnTick& on_tick) {
+  std::uint64_t frame = 0;
+  std::shared_ptr<const Cloud> in_use;
   const auto ticks =
       static_cast<std::int64_t>(std::llround(scenario.duration * scenario.tick_rate));
   for (std::int64_t i = 0; i <= ticks; ++i) {
     const double t = static_cast<double>(i) / scenario.tick_rate;
-    arrivals.until(t, [&method](const std::shared_ptr<const Cloud>& cloud, double stamp) {
-      method.observe({*cloud, stamp});
-    });
-    const Tick tick = method.tick(scenario.hip(t), t);
-    if (fallible != nullptr) fallible->rethrow();
-    if (!on_tick(tick)) return;
+    for (;; ++frame) {
+      const double stamp = static_cast<double>(frame) / scenario.frame_rate;
+      const std::optional<double> delay = scenario.delay ? scenario.delay(frame) : 0.0;
+      if (stamp + delay.value_or(0.0) > t + 1e-9) break;
+      if (!delay) continue;
+      std::shared_ptr<const Cloud> cloud = scenario.cloud(frame, stamp);
+      on_frame(cloud, stamp, t);
+      in_use = std::move(cloud);  // only now may the frame before go
+    }
+    if (!on_tick(t)) return;
   }
+}
+
+/// Plays a scenario to a method.
+/// @param on_tick  (const Tick&) -> bool, after each tick: continue?
+template <class OnTick>
+void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
+  const auto* of_lab = dynamic_cast<const LabMethod*>(&method);
+  run(
+      scenario,
+      [&](const std::shared_ptr<const Cloud>& cloud, double stamp, double /*t*/) {
+        method.observe({*cloud, stamp});
+      },
+      [&](double t) {
+        const Tick tick = method.tick(scenario.hip(t), t);
+        if (of_lab != nullptr) of_lab->rethrow();
+        return on_tick(tick);
+      });
 }
 
 }  // namespace palpate::lab

@@ -12,15 +12,12 @@ namespace {
 
 std::string command_line(const Experiment& experiment, const ExperimentOptions& options) {
   std::string line = "palpate eval " + std::string(experiment.name);
-  if (!options.methods.empty()) {
-    line += " --methods ";
-    for (std::size_t i = 0; i < options.methods.size(); ++i)
-      line += (i == 0 ? "" : ",") + options.methods[i];
-  }
+  if (!options.methods.empty())
+    line += fmt::format(" --methods {}", fmt::join(options.methods, ","));
   if (options.grid) line += fmt::format(" --grid {}x{}", options.grid->first, options.grid->second);
   if (options.cases) line += fmt::format(" --cases {}", *options.cases);
-  for (std::size_t i = 0; i < options.families.size(); ++i)
-    line += (i == 0 ? " --families " : ",") + options.families[i];
+  if (!options.families.empty())
+    line += fmt::format(" --families {}", fmt::join(options.families, ","));
   for (const std::string& value : options.fixed) line += " --fix " + value;
   if (!options.case_text.empty()) line += " --case '" + options.case_text + "'";
   if (options.noise == Noise::correlated) line += " --noise correlated";

@@ -7,7 +7,6 @@
 #include <complex>
 #include <limits>
 #include <numbers>
-#include <span>
 
 namespace palpate::lab {
 
@@ -43,6 +42,13 @@ double felt_power(std::span<const double> signal) {
   return power;
 }
 
+constexpr double z = 1.959964;  // of the normal distribution, 95 % between -z and z
+
+// The same of Student's distribution, from one degree of freedom on.
+constexpr std::array student_t = {12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365,
+                                  2.306,  2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
+                                  2.131,  2.120, 2.110, 2.101, 2.093, 2.086};
+
 }  // namespace
 
 double felt_rms(const std::vector<double>& signal) {
@@ -57,17 +63,6 @@ double felt_rms(const std::vector<double>& signal) {
 double felt_rms_of_all(const std::vector<double>& signal) {
   return signal.empty() ? 0.0 : std::sqrt(felt_power(signal));
 }
-
-namespace {
-
-constexpr double z = 1.959964;  // of the normal distribution, 95 % between -z and z
-
-// The same of Student's distribution, from one degree of freedom on.
-constexpr std::array student_t = {12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365,
-                                  2.306,  2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
-                                  2.131,  2.120, 2.110, 2.101, 2.093, 2.086};
-
-}  // namespace
 
 Interval wilson(std::size_t successes, std::size_t of) {
   const auto n = static_cast<double>(of);

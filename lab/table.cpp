@@ -2,7 +2,6 @@
 #include "lab/table.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -15,6 +14,8 @@
 
 namespace palpate::lab {
 namespace {
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<std::string> split(std::string_view text, char separator) {
   std::vector<std::string> parts;
@@ -105,12 +106,6 @@ std::vector<std::string> texts_in(const Table& table, std::string_view column) {
   return texts;
 }
 
-namespace {
-
-constexpr double none = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
-
 double first(std::span<const double> values) { return values.empty() ? none : values.front(); }
 
 double sum(std::span<const double> values) {
@@ -127,11 +122,6 @@ double median(std::span<const double> values) {
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
   return *middle;
-}
-
-std::string csv_field(double number) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), number).ptr};
 }
 
 void write_file(const std::filesystem::path& file, const std::string& text) {

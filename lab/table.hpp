@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/kernel/core/pose.hpp"
+
 namespace palpate::lab {
 
 /// Columns and the text that each has in the rows that are meant.
@@ -71,7 +73,7 @@ double largest(std::span<const double> values);
 double median(std::span<const double> values);
 
 /// A field of a CSV: numbers in the shortest form that reads back to the same value.
-std::string csv_field(double number);
+inline std::string csv_field(double number) { return shortest(number); }
 inline std::string csv_field(std::string_view text) { return std::string(text); }
 template <std::integral Whole>
 std::string csv_field(Whole number) {

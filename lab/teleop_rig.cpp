@@ -23,7 +23,6 @@ Vec3 no_longer_than(const Vec3& v, double longest) {
   return size > longest ? Vec3(longest / size * v) : v;
 }
 
-// One way to couple both ends.
 class Coupling {
  public:
   Coupling() = default;
@@ -322,11 +321,6 @@ std::unique_ptr<Coupling> make_coupling(const TeleopCase& one, SimulatedHand& ha
 }
 
 }  // namespace
-
-const std::vector<std::string_view>& teleop_ways() {
-  static const std::vector<std::string_view> ways{"palpate", "position-force", "wave", "tdpa"};
-  return ways;
-}
 
 void play_teleop(const TeleopScene& scene, const TeleopCase& one,
                  const std::function<void(const TeleopTick&)>& on_tick) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -12,12 +13,11 @@
 #include <vector>
 
 #include "lab/method.hpp"
-#include "palpate/io/devices/device_body.hpp"
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/kernel/core/cloud.hpp"
 #include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/fixtures/fixture_set.hpp"
 #include "palpate/net/teleop/robot.hpp"
-#include "palpate/net/teleop/set_point.hpp"
 
 namespace palpate::lab {
 
@@ -93,7 +93,7 @@ struct TeleopScene {
 
 /// Who is coupled to what, and how.
 struct TeleopCase {
-  std::string_view way;  ///< one of teleop_ways()
+  std::string_view way;  ///< one of teleop_ways
   LinkQuality up = {}, down = {};
   Parameters parameters = {};
   std::uint64_t seed = 1;
@@ -103,9 +103,9 @@ struct TeleopCase {
   double robot_dies = std::numeric_limits<double>::infinity();
 };
 
-/// `palpate`, and what others do: `position-force`, `wave` (wave variables), `tdpa` (time-domain
-/// passivity).
-const std::vector<std::string_view>& teleop_ways();
+/// `palpate`, and what others do: `wave` (wave variables), `tdpa` (time-domain passivity).
+inline constexpr std::array<std::string_view, 4> teleop_ways{"palpate", "position-force", "wave",
+                                                             "tdpa"};
 
 /// A millisecond at both ends.
 struct TeleopTick {

@@ -2,7 +2,6 @@
 #include "python/arrays.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 #include "palpate/kernel/core/error.hpp"
@@ -144,7 +143,7 @@ void check_signals() {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
 }
 
-std::shared_ptr<const void> kept(py::object object) {
+std::shared_ptr<const py::object> kept(py::object object) {
   auto* owner = new py::object(std::move(object));
   return {owner, [](const py::object* let_go) {
             const py::gil_scoped_acquire gil;

@@ -14,6 +14,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/material_map.hpp"
 #include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/tick.hpp"
 #include "palpate/servo/cycle.hpp"
@@ -84,11 +87,39 @@ std::vector<std::pair<std::string, double>> numbers_of(const py::dict& values);
 /// range; TypeError for what is no number.
 void set_all(Parameters& parameters, const py::kwargs& values);
 
+/// The values that the rows of a table have in an object, by the rows' names.
+template <class Table, class Object>
+py::dict values_of(const Table& table, const Object& object) {
+  py::dict values;
+  for (const auto& row : table) values[py::str(std::string(row.name))] = row.get(object);
+  return values;
+}
+
+/// What surfaces are made of: palpate.Materials.
+struct MaterialsOf {
+  std::shared_ptr<const MaterialTable> table;
+};
+
+/// Labels without a brightness, or the other way round, or both.
+/// @param labels      uint8 (height, width), or None
+/// @param brightness  likewise
+/// @return null if nothing is given
+/// @throws Error or TypeError for arrays of another form
+std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
+                                            const std::optional<MaterialsOf>& materials,
+                                            const py::object& labels, const py::object& brightness);
+
+/// A camera that is a Python object: iterating over it gives (cloud, stamp) or ends. Its attribute
+/// `live`, if it has one, says that stamps are time.monotonic(); with an attribute
+/// `scale_reference` it is brought to metres (with_scale_reference). [with the lock]
+/// @throws Error if one cannot iterate over it, or as with_scale_reference
+std::unique_ptr<Source> open_python_source(const py::object& camera);
+
 /// Lets Python handle a signal, such as Ctrl-C; throws what it raises. Takes the GIL.
 void check_signals();
 
 /// An object of Python's that C++ may release on any thread.
-std::shared_ptr<const void> kept(py::object object);
+std::shared_ptr<const py::object> kept(py::object object);
 
 /// What the parts of the module define.
 void define_core(py::module_& module);

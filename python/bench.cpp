@@ -37,8 +37,7 @@ std::vector<lab::OwnMethod> own_methods(const Own& own, const std::shared_ptr<Tr
     methods.push_back({name, [trouble, maker = kept(make)](const lab::MethodSetup& setup) {
                          trouble->rethrow();
                          const py::gil_scoped_acquire gil;
-                         const auto& function = *static_cast<const py::object*>(maker.get());
-                         return method_of(function(), setup.parameters, trouble);
+                         return method_of((*maker)(), setup.parameters, trouble);
                        }});
   }
   return methods;
@@ -151,12 +150,7 @@ void define_bench(py::module_& m) {
         py::arg("run"));
   m.def("_bench_check", &check, py::arg("file"), py::arg("own"), py::arg("sample"),
         py::arg("chance"), py::arg("recordings"), py::arg("jobs"));
-  m.def("_bench_methods", [] {
-    py::dict all;
-    const MethodRegistry methods = lab::methods();
-    for (const MethodInfo& method : methods.entries()) all[py::str(method.name)] = method.summary;
-    return all;
-  });
+  m.def("_bench_methods", [] { return summaries_of(lab::methods()); });
 }
 
 }  // namespace palpate::python

@@ -112,10 +112,6 @@ def get_requires_for_build_wheel(config_settings=None):
     return []
 
 
-def get_requires_for_build_sdist(config_settings=None):
-    return []
-
-
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
     """Writes what is known without building, and returns its folder's name."""
     info = pathlib.Path(metadata_directory) / f"{TITLE}.dist-info"

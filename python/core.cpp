@@ -7,14 +7,12 @@
 
 #include "palpate/io/sources/material_file.hpp"
 #include "palpate/io/sources/tool_file.hpp"
-#include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/safety.hpp"
 
 #include "python/arrays.hpp"
-#include "python/materials.hpp"
 #include "python/python_method.hpp"
 
 namespace palpate::python {
@@ -32,30 +30,6 @@ std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what, co
   check_shape(pixels, what, {k.height, k.width}, image_shape);
   return {pixels.data(), pixels.data() + pixels.size()};
 }
-
-}  // namespace
-
-std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
-                                            const std::optional<MaterialsOf>& materials,
-                                            const py::object& labels,
-                                            const py::object& brightness) {
-  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
-  if (!materials && !labels.is_none())
-    throw Error("labels", "there are no materials that they name",
-                "give materials=palpate.Materials(...)");
-  if (materials && labels.is_none() && materials->table->materials.size() > 1)
-    throw Error("materials", "nothing says which pixel is which of them",
-                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
-  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
-  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
-  return std::make_shared<LabelImage>(
-      materials ? materials->table : std::make_shared<const MaterialTable>(),
-      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
-                       : bytes_of(labels, "labels", k),
-      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
-}
-
-namespace {
 
 using namespace py::literals;
 using SharedRays = std::shared_ptr<const ViewingRays>;
@@ -209,13 +183,6 @@ class Renderer {
   std::array<std::shared_ptr<Cloud>, Patch::max_views> clouds_;  // by camera
 };
 
-py::dict values_of(const Parameters& parameters) {
-  py::dict values;
-  for (const ParameterInfo& row : parameter_table())
-    values[py::str(std::string(row.name))] = row.get(parameters);
-  return values;
-}
-
 template <class Table>
 py::dict table_dict(const Table& table) {
   py::dict all;
@@ -251,23 +218,13 @@ void define_tables(py::module_& m) {
       "materials",
       [] {
         py::dict all;
-        for (const NamedMaterial& named : standard_materials().materials) {
-          py::dict numbers;
-          for (const MaterialInfo& row : material_table())
-            numbers[py::str(std::string(row.name))] = row.get(named.material);
-          all[py::str(named.name)] = numbers;
-        }
+        for (const NamedMaterial& named : standard_materials().materials)
+          all[py::str(named.name)] = values_of(material_table(), named.material);
         return all;
       },
       "The standard materials: name -> its numbers, as Materials takes them.");
   m.def(
-      "methods",
-      [] {
-        py::dict all;
-        for (const MethodInfo& method : standard_methods().entries())
-          all[py::str(method.name)] = method.summary;
-        return all;
-      },
+      "methods", [] { return summaries_of(standard_methods()); },
       "The available methods: name -> description.");
   m.def(
       "flags",
@@ -526,11 +483,32 @@ void define_renderer(py::module_& m) {
       .def("seat", &Renderer::seat, py::arg("proxy"),
            "Puts the proxy at a place [m, world] in free motion and forgets the contact.")
       .def_property_readonly(
-          "parameters", [](const Renderer& self) { return values_of(self.parameters()); },
+          "parameters",
+          [](const Renderer& self) { return values_of(parameter_table(), self.parameters()); },
           "All parameters as they are: name -> value.");
 }
 
 }  // namespace
+
+std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
+                                            const std::optional<MaterialsOf>& materials,
+                                            const py::object& labels,
+                                            const py::object& brightness) {
+  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
+  if (!materials && !labels.is_none())
+    throw Error("labels", "there are no materials that they name",
+                "give materials=palpate.Materials(...)");
+  if (materials && labels.is_none() && materials->table->materials.size() > 1)
+    throw Error("materials", "nothing says which pixel is which of them",
+                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
+  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
+  return std::make_shared<LabelImage>(
+      materials ? materials->table : std::make_shared<const MaterialTable>(),
+      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
+                       : bytes_of(labels, "labels", k),
+      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
+}
 
 void define_core(py::module_& module) {
   define_tables(module);

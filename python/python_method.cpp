@@ -31,91 +31,102 @@ Points CloudView::near(const Numbers& about, double radius) {
   return rows_of(points);
 }
 
-PythonMethod::PythonMethod(py::object object, std::shared_ptr<Trouble> trouble)
-    : object_(std::move(object)), trouble_(std::move(trouble)) {
-  for (const char* name : {"frame", "tick"}) {
-    if (!py::hasattr(object_, name))
-      throw Error("method", std::string("it has no function ") + name,
-                  "derive its class from palpate.Method");
+namespace {
+
+class PythonMethod final : public Method {
+ public:
+  PythonMethod(py::object object, std::shared_ptr<Trouble> trouble)
+      : object_(std::move(object)), trouble_(std::move(trouble)) {
+    for (const char* name : {"frame", "tick"}) {
+      if (!py::hasattr(object_, name))
+        throw Error("method", std::string("it has no function ") + name,
+                    "derive its class from palpate.Method");
+    }
+    tick_ = object_.attr("tick");
   }
-  tick_ = object_.attr("tick");
-}
 
-PythonMethod::~PythonMethod() {
-  const py::gil_scoped_acquire gil;
-  if (view_) view_->end();
-  object_ = tick_ = view_object_ = py::object();
-}
-
-void PythonMethod::seat(const Vec3& proxy) noexcept {
-  if (!proxy.allFinite() || trouble_->first) return;
-  const py::gil_scoped_acquire gil;
-  try {
-    if (py::hasattr(object_, "seat")) object_.attr("seat")(proxy);
-  } catch (...) {
-    trouble_->first = std::current_exception();
-  }
-}
-
-void PythonMethod::observe(const Observation& seen) noexcept {
-  clouds_.take(seen.camera, seen.cloud);
-  ++frames_;
-  if (trouble_->first) return;
-  const py::gil_scoped_acquire gil;
-  try {
+  ~PythonMethod() override {
+    const py::gil_scoped_acquire gil;
     if (view_) view_->end();
-    view_ = std::make_shared<CloudView>(&clouds_);
-    view_object_ = py::cast(view_);
-    object_.attr("frame")(view_object_, seen.stamp);
-  } catch (...) {
-    trouble_->first = std::current_exception();
+    object_ = tick_ = view_object_ = py::object();
   }
-}
 
-Tick PythonMethod::tick(const Vec3& hip, double t) noexcept {
-  Tick tick = free_tick(hip, t, frames_);
-  if (trouble_->first || !hip.allFinite()) return tick;
-  if (frames_ < 0) {
-    tick.flags = no_frame;
+  void seat(const Vec3& proxy) noexcept override {
+    if (!proxy.allFinite()) return;
+    attempt([&] {
+      if (py::hasattr(object_, "seat")) object_.attr("seat")(proxy);
+    });
+  }
+
+  void observe(const Observation& seen) noexcept override {
+    clouds_.take(seen.camera, seen.cloud);
+    ++frames_;
+    attempt([&] {
+      if (view_) view_->end();
+      view_ = std::make_shared<CloudView>(&clouds_);
+      view_object_ = py::cast(view_);
+      object_.attr("frame")(view_object_, seen.stamp);
+    });
+  }
+
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    Tick tick = free_tick(hip, t, frames_);
+    if (trouble_->first || !hip.allFinite()) return tick;
+    if (frames_ < 0) {
+      tick.flags = no_frame;
+      return tick;
+    }
+    attempt([&] {
+      const auto answer = py::cast<py::tuple>(tick_(hip, t));
+      if (answer.size() != 2 && answer.size() != 3)
+        throw Error("method", "its tick gave " + std::to_string(answer.size()) + " values",
+                    "return (proxy, force) or (proxy, force, normal)");
+      const Vec3 proxy = vector_of(py::cast<Numbers>(answer[0]), "proxy");
+      const Vec3 force = vector_of(py::cast<Numbers>(answer[1]), "force");
+      const Vec3 normal = answer.size() == 3 ? vector_of(py::cast<Numbers>(answer[2]), "normal")
+                                             : Vec3((proxy - hip).stableNormalized());
+      if (!is_place(proxy) || !force.allFinite() || !normal.allFinite())
+        throw Error("method", "its tick gave a number that is not finite",
+                    "return a proxy [m] and a force [N]");
+      tick.proxy = proxy;
+      tick.force = force;
+      if (force.squaredNorm() > 0.0) {
+        tick.normal = normal;
+        tick.state = ContactState::contact;
+      }
+    });
     return tick;
   }
-  const py::gil_scoped_acquire gil;
-  try {
-    const auto answer = py::cast<py::tuple>(tick_(hip, t));
-    if (answer.size() != 2 && answer.size() != 3)
-      throw Error("method", "its tick gave " + std::to_string(answer.size()) + " values",
-                  "return (proxy, force) or (proxy, force, normal)");
-    const Vec3 proxy = vector_of(py::cast<Numbers>(answer[0]), "proxy");
-    const Vec3 force = vector_of(py::cast<Numbers>(answer[1]), "force");
-    const Vec3 normal = answer.size() == 3 ? vector_of(py::cast<Numbers>(answer[2]), "normal")
-                                           : Vec3((proxy - hip).stableNormalized());
-    if (!is_place(proxy) || !force.allFinite() || !normal.allFinite())
-      throw Error("method", "its tick gave a number that is not finite",
-                  "return a proxy [m] and a force [N]");
-    tick.proxy = proxy;
-    tick.force = force;
-    if (force.squaredNorm() > 0.0) {
-      tick.normal = normal;
-      tick.state = ContactState::contact;
-    }
-  } catch (...) {
-    trouble_->first = std::current_exception();
-  }
-  return tick;
-}
 
-void PythonMethod::set_parameters(const Parameters& parameters) noexcept {
-  const py::gil_scoped_acquire gil;
-  try {
-    if (!py::hasattr(object_, "set_parameters")) return;
-    py::dict values;
-    for (const ParameterInfo& row : parameter_table())
-      values[py::str(std::string(row.name))] = row.get(parameters);
-    object_.attr("set_parameters")(values);
-  } catch (...) {
-    trouble_->first = std::current_exception();
+  void set_parameters(const Parameters& parameters) noexcept override {
+    attempt([&] {
+      if (py::hasattr(object_, "set_parameters"))
+        object_.attr("set_parameters")(values_of(parameter_table(), parameters));
+    });
   }
-}
+
+ private:
+  template <class Do>
+  void attempt(const Do& act) noexcept {
+    if (trouble_->first) return;
+    const py::gil_scoped_acquire gil;
+    try {
+      act();
+    } catch (...) {
+      trouble_->first = std::current_exception();
+    }
+  }
+
+  py::object object_;
+  py::object tick_;
+  ObservedClouds clouds_;
+  std::shared_ptr<CloudView> view_;
+  py::object view_object_;
+  std::shared_ptr<Trouble> trouble_;
+  std::int64_t frames_ = -1;
+};
+
+}  // namespace
 
 std::unique_ptr<Method> method_of(const py::object& method, const Parameters& parameters,
                                   const std::shared_ptr<Trouble>& trouble) {
@@ -126,6 +137,12 @@ std::unique_ptr<Method> method_of(const py::object& method, const Parameters& pa
   made->set_parameters(parameters);
   trouble->rethrow();
   return made;
+}
+
+py::dict summaries_of(const MethodRegistry& methods) {
+  py::dict all;
+  for (const MethodInfo& method : methods.entries()) all[py::str(method.name)] = method.summary;
+  return all;
 }
 
 }  // namespace palpate::python

@@ -38,31 +38,13 @@ struct Trouble {
   }
 };
 
-/// A method whose `frame` and `tick` are a Python object's. Takes the GIL for each call; after an
-/// exception it touches nothing more.
-class PythonMethod final : public Method {
- public:
-  PythonMethod(py::object object, std::shared_ptr<Trouble> trouble);
-  ~PythonMethod() override;
-
-  void seat(const Vec3& proxy) noexcept override;
-  void observe(const Observation& seen) noexcept override;
-  Tick tick(const Vec3& hip, double t) noexcept override;
-  void set_parameters(const Parameters& parameters) noexcept override;
-
- private:
-  py::object object_;
-  py::object tick_;
-  ObservedClouds clouds_;
-  std::shared_ptr<CloudView> view_;
-  py::object view_object_;
-  std::shared_ptr<Trouble> trouble_;
-  std::int64_t frames_ = -1;
-};
-
-/// A method by its name, or an object of a class derived from palpate.Method.
+/// A method by its name, or an object of a class derived from palpate.Method, which takes the GIL
+/// for each call and touches nothing more after an exception.
 /// @throws Error for an unknown name, or parameters that do not validate.
 std::unique_ptr<Method> method_of(const py::object& method, const Parameters& parameters,
                                   const std::shared_ptr<Trouble>& trouble);
+
+/// name -> summary
+py::dict summaries_of(const MethodRegistry& methods);
 
 }  // namespace palpate::python

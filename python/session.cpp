@@ -19,8 +19,6 @@
 #include "palpate/kernel/core/error.hpp"
 
 #include "python/arrays.hpp"
-#include "python/materials.hpp"
-#include "python/python_source.hpp"
 
 namespace palpate::python {
 namespace {
@@ -75,17 +73,12 @@ HandSpec hand_of(const py::handle& what) {
 // Asks a Python function, on a camera's thread, which of the materials each pixel is.
 // @param labels  called with the camera's number and its depth; gives labels or None
 auto labelled(const MaterialsOf& materials, const py::function& labels) {
-  // Let go of on whatever thread; so the last reference takes the lock of the interpreter.
-  const std::shared_ptr<py::function> function(new py::function(labels), [](py::function* held) {
-    const py::gil_scoped_acquire lock;
-    delete held;
-  });
-  return [materials, function](std::size_t camera, const DepthImage& image) {
+  return [materials, held = kept(labels)](std::size_t camera, const DepthImage& image) {
     const py::gil_scoped_acquire lock;
     try {
       const Intrinsics& k = image.intrinsics();
       const py::array_t<std::uint16_t> depth({k.height, k.width}, image.depth().data());
-      const py::object found = (*function)(camera, depth);
+      const py::object found = (*held)(camera, depth);
       return found.is_none() ? nullptr : make_map(k, materials, found, py::none());
     } catch (py::error_already_set& error) {  // of the interpreter, which is locked here alone
       throw Error("labels", error.what(), "return uint8 (height, width), or None");

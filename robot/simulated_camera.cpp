@@ -153,12 +153,13 @@ ViewingRays::Window SimulatedCamera::window(const Shape& shape,
     hull = {std::min(hull.u_begin, one.u_begin), std::max(hull.u_end, one.u_end),
             std::min(hull.v_begin, one.v_begin), std::max(hull.v_end, one.v_end)};
   };
+  const auto add_rod = [&](const auto& rod) {
+    for (const double side : {-1.0, 1.0}) add({0.0, side * rod.half_length, 0.0}, rod.radius);
+  };
   if (const auto* capsule = std::get_if<Capsule>(&shape)) {
-    for (const double side : {-1.0, 1.0})
-      add({0.0, side * capsule->half_length, 0.0}, capsule->radius);
+    add_rod(*capsule);
   } else if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
-    for (const double side : {-1.0, 1.0})
-      add({0.0, side * cylinder->half_length, 0.0}, cylinder->radius);
+    add_rod(*cylinder);
   } else if (const auto* prism = std::get_if<Prism>(&shape)) {
     // Balls of some size, so that each has a pixel.
     for (const Eigen::Vector2d& corner : prism->outline) {

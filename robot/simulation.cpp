@@ -57,12 +57,11 @@ constexpr double largest_lag = 0.05;  // [s] that is caught up in real time
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-struct ModelDeleter {
+struct Deleter {
   void operator()(mjModel* model) const { mj_deleteModel(model); }
-};
-struct DataDeleter {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
+using Model = std::unique_ptr<mjModel, Deleter>;
 
 // What MuJoCo calls where it would end the process. The exception passes through its C frames,
 // which hold nothing but memory of the mjData that is not used again.
@@ -79,13 +78,13 @@ void install_handlers() {
   });
 }
 
-std::unique_ptr<mjModel, ModelDeleter> compile(std::string_view mjcf) {
+Model compile(std::string_view mjcf) {
   install_handlers();
   constexpr const char* name = "cell.xml";
   const auto files = std::make_unique<mjVFS>();  // 2 MB
   mj_defaultVFS(files.get());
   std::array<char, 1000> message{};
-  std::unique_ptr<mjModel, ModelDeleter> model;
+  Model model;
   try {
     // An empty text would make a file without data.
     if (!mjcf.empty() &&
@@ -329,7 +328,6 @@ class Simulation::Implementation {
         data_->site_xmat + 9 * static_cast<std::ptrdiff_t>(tip_site_)));
   }
 
-  // The arm's torques.
   void lead() {
     const mjModel& m = *model_;
     mjData& d = *data_;
@@ -541,8 +539,8 @@ class Simulation::Implementation {
   }
 
   SimulationSetup setup_;
-  std::unique_ptr<mjModel, ModelDeleter> model_;
-  std::unique_ptr<mjData, DataDeleter> data_;
+  Model model_;
+  std::unique_ptr<mjData, Deleter> data_;
   RobotInfo info_;
   Eigen::AlignedBox3d reach_;
   std::vector<VisibleGeom> geoms_;

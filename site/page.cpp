@@ -3,7 +3,6 @@
 // threads. worker.js calls what is exported here and posts what comes out of it.
 #include "site/page.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 #include <exception>
@@ -19,7 +18,6 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/io/sources/scene.hpp"
-#include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/net/viewer/session_host.hpp"
 #include "palpate/record/replay.hpp"
@@ -307,15 +305,13 @@ bool tried(const Do& act) {
   }
 }
 
-}  // namespace
-
-namespace {
 std::vector<std::byte> converted(const char* by, std::span<const std::byte> from,
                                  std::size_t max_bytes) {
   std::vector<std::byte> bytes(max_bytes);
   bytes.resize(convert(by, from.data(), from.size(), bytes.data(), max_bytes));
   return bytes;
 }
+
 }  // namespace
 
 std::vector<std::byte> unpack_zstd(std::span<const std::byte> packed, std::size_t max_bytes) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // depth_png.cpp without libpng: the page's JavaScript packs and unpacks, and interlaced images,
 // palettes and fewer than 8 bits are refused.
-#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <cstring>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -79,19 +79,11 @@ Json to_json(const SearchCosts& costs) {
   return json;
 }
 
-// One subject measured whole.
 struct Row {
   std::string name;
   KernelCosts kernel;
   std::vector<SearchCosts> search;
 };
-
-const SearchCosts& search_named(const Row& row, std::string_view name) {
-  for (const SearchCosts& costs : row.search) {
-    if (costs.name == name) return costs;
-  }
-  throw std::logic_error("no search is called " + std::string(name));
-}
 
 bench::MethodChoice choice_of(const BenchOptions& options) {
   const MethodChoice choice = options.method.choice(standard_methods());
@@ -149,7 +141,9 @@ int report(const BenchOptions& options) {
   const bench::MethodChoice method = choice_of(options);
   const std::vector<Row> rows = measure_all(options, method);
   const Row& one_metre = rows[2];  // 640x480 at summary_distance
-  const SearchCosts& tree = search_named(one_metre, "nanoflann");
+  const SearchCosts& tree =
+      *std::find_if(one_metre.search.begin(), one_metre.search.end(),
+                    [](const SearchCosts& costs) { return costs.name == "nanoflann"; });
   const std::size_t growth = growth_of_memory(method, budget_of(options));
   const std::string known = look_at_machine().processor;
   const std::string processor = known.empty() ? "unknown processor" : known;

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/machine.hpp"
+#include "app/options.hpp"
 #include "app/progress.hpp"
 #include "app/verbs.hpp"
 #include "lab/entry.hpp"
@@ -122,11 +123,9 @@ Verb add_bench_entry(CLI::App& program) {
   command->add_option("--cases", options->entry.cases, "number of cases of each family (25)");
   command->add_option("--repeats", options->entry.repeats,
                       "repeats of each scene of fidelity, in each of four parts (5)");
-  command
-      ->add_option(
-          "--recording", options->entry.recordings,
-          "recording of a camera at rest, e.g. depth:FOLDER?frames=8; may be given several times")
-      ->allow_extra_args(false);
+  add_repeated(
+      *command, "--recording", options->entry.recordings,
+      "recording of a camera at rest, e.g. depth:FOLDER?frames=8; may be given several times");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume,
                     "continue from the finished cases of an interrupted run, with its --seed");
@@ -139,10 +138,8 @@ Verb add_bench_check(CLI::App& program) {
   const auto options = std::make_shared<CheckArguments>();
   command->add_option("entry", options->file, "its file")->required();
   command->add_option("--sample", options->sample, "number of cases and scenes (20)");
-  command
-      ->add_option("--recording", options->recordings,
-                   "recording with which the entry was made; may be given several times")
-      ->allow_extra_args(false);
+  add_repeated(*command, "--recording", options->recordings,
+               "recording with which the entry was made; may be given several times");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   return {command, [options] { return check(*options); }};
 }

@@ -65,19 +65,17 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
   return result;
 }
 
-int list(const EvalOptions& options) {
+int eval(const EvalOptions& options) {
   if (options.list_methods) {
     const MethodRegistry methods = lab::methods();
     for (const MethodInfo& method : methods.entries()) fmt::print("{}\n", method.name);
     return 0;
   }
-  for (const lab::Experiment& experiment : lab::known_experiments())
-    fmt::print("{:<14} {}\n", experiment.name, experiment.summary);
-  return 0;
-}
-
-int eval(const EvalOptions& options) {
-  if (options.list_methods || options.list_experiments) return list(options);
+  if (options.list_experiments) {
+    for (const lab::Experiment& experiment : lab::known_experiments())
+      fmt::print("{:<14} {}\n", experiment.name, experiment.summary);
+    return 0;
+  }
   if (options.names.empty())
     throw Error("eval", "no experiment is given", "see 'palpate eval --list' for their names");
   const lab::ExperimentOptions given = experiment_options(options);
@@ -133,23 +131,17 @@ Verb add_eval(CLI::App& program) {
   const auto options = std::make_shared<EvalOptions>();
   command->add_option("experiment", options->names, "its name, several, or all; see --list");
   command->add_option("--out", options->out, "folder for CSV files and tables (eval)");
-  command
-      ->add_option("--methods", options->given.methods,
-                   "methods to compare, separated by commas; see --list-methods")
-      ->delimiter(',')
-      ->allow_extra_args(false);
+  add_repeated(*command, "--methods", options->given.methods,
+               "methods to compare, separated by commas; see --list-methods")
+      ->delimiter(',');
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
                       "pop, field, visits: number of cases of each family or class (50, 5, 4)");
-  command
-      ->add_option("--families", options->given.families,
-                   "pop, field, visits, fidelity, feel: which, separated by commas")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  command
-      ->add_option("--fix", options->given.fixed,
-                   "pop, field, visits: KEY=VALUE instead of a random value")
-      ->allow_extra_args(false);
+  add_repeated(*command, "--families", options->given.families,
+               "pop, field, visits, fidelity, feel: which, separated by commas")
+      ->delimiter(',');
+  add_repeated(*command, "--fix", options->given.fixed,
+               "pop, field, visits: KEY=VALUE instead of a random value");
   command->add_option("--case", options->given.case_text,
                       "pop, field, visits: one case as a run printed it, such as field:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");

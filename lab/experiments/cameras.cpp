@@ -43,7 +43,6 @@ constexpr std::array<Rig, 5> rigs{{{.name = "in-turn"},
                                    {.name = "3mm-apart", .pose_error = 3e-3},
                                    {.name = "one-blinded", .is_blinded = true}}};
 
-// What is felt at rest.
 struct Rest {
   double sum = 0.0, squares = 0.0, count = 0.0;  // of the force [N]
   double step = 0.0;                             // [N] largest from tick to tick
@@ -124,9 +123,7 @@ std::string rig_row(const Rig& rig, const std::string& name, const ExperimentOpt
 }
 
 std::vector<Cell> cameras_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<std::string_view> names;
-  for (const Rig& rig : rigs) names.push_back(rig.name);
-  check_families(options, "cameras has no such rig", names);
+  check_families(options, "cameras has no such rig", names_of(rigs));
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options))
     for (const Rig& rig : rigs)

@@ -10,7 +10,6 @@
 
 #include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -27,16 +26,15 @@ struct Measure {
 
 struct FeelScene {
   std::string name;
-  std::function<FeelFigures(const std::vector<OwnMethod>&, const FeelOptions&)> play;
+  std::function<FeelFigures(const FeelOptions&)> play;
   std::vector<Measure> measures = {};
 };
 
 std::vector<FeelScene> all_scenes() {
   std::vector<FeelScene> all;
   const auto scene = [&all](std::string name, auto play, auto... more) {
-    all.push_back({std::move(name), [=](const auto& contestants, const FeelOptions& options) {
-                     return play(contestants, options, more...);
-                   }});
+    all.push_back(
+        {std::move(name), [=](const FeelOptions& options) { return play(options, more...); }});
   };
   // The aim is meant for the first loops; the others have the figure alone.
   const auto measure = [&all](std::string_view name, std::string_view unit,
@@ -123,18 +121,17 @@ std::string rows_of(const FeelScene& scene, const FeelFigures& figures) {
 // All methods play a scene in one cell, so that its frames are made but once.
 std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptions& options) {
   check_families(options, "feel has no such scene", names_of(scenes()));
-  std::vector<OwnMethod> contestants;
-  for (const std::string& name : methods_of(experiment, options))
-    contestants.push_back(
-        {name, [name](const MethodSetup& setup) { return make_method(name, setup); }});
   FeelOptions feel;
+  for (const std::string& name : methods_of(experiment, options))
+    feel.contestants.push_back(
+        {name, [name](const MethodSetup& setup) { return make_method(name, setup); }});
   feel.parameters = options.parameters;
   feel.seed = options.seed;
   if (options.grid) std::tie(feel.repeats, feel.phases) = *options.grid;
   std::vector<Cell> cells;
   for (const FeelScene& scene : scenes())
     if (options.wants(scene.name))
-      cells.emplace_back([=, &scene] { return rows_of(scene, scene.play(contestants, feel)); });
+      cells.emplace_back([=, &scene] { return rows_of(scene, scene.play(feel)); });
   return cells;
 }
 

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include <fmt/format.h>
-
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
@@ -19,7 +17,6 @@ constexpr double first = 2.0;    // [s] the chain's ramp and the first frames ar
 constexpr double clear = 0.015;  // [m] above the surface, before and after a contact
 constexpr int contacts_a_hand = 8;
 
-// Who holds what.
 struct Holding {
   std::string_view loop;
   std::string_view device;
@@ -30,7 +27,6 @@ constexpr std::array holdings = {
     Holding{"light", "touch", "light", false}, Holding{"firm", "touch", "firm", false},
     Holding{"omega", "omega", "light", false}, Holding{"chain", "touch", "light", true}};
 
-// A hand's way, and when each of its contacts is over.
 struct Presses {
   HipPath path;
   std::vector<double> ends;  // [s]
@@ -83,15 +79,14 @@ class Meter {
 
 }  // namespace
 
-FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                        double distance, const std::string& sensor) {
+FeelFigures play_energy(const FeelOptions& options, double distance, const std::string& sensor) {
   struct Counted {
     std::vector<double> above;  // [mJ]
     double sum = 0.0;           // [mJ]
     double ruler = 0.0;         // [mJ] the same of the exact surface
   };
   std::vector<double> by_chain;  // [mJ] of the exact surface, above the same without the chain
-  std::vector<std::vector<Counted>> counted(contestants.size(),
+  std::vector<std::vector<Counted>> counted(options.contestants.size(),
                                             std::vector<Counted>(holdings.size()));
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = options.seed_of(k);
@@ -117,13 +112,13 @@ FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOpt
           meters.emplace_back(hand.ends);
         };
         add(make_method("ideal", {options.parameters, truth}));
-        for (const OwnMethod& contestant : contestants)
+        for (const OwnMethod& contestant : options.contestants)
           add(contestant.make({options.parameters, truth}));
       }
     }
     play_to(loops, stage.scenario(duration + 0.01),
             [&](std::size_t loop, const Felt& felt) { meters[loop].add(felt); });
-    const std::size_t group = 1 + contestants.size();
+    const std::size_t group = 1 + options.contestants.size();
     for (std::size_t i = 0; i < hands.size(); ++i) {
       const std::vector<double>& straight = meters[i * group].made;
       const std::vector<double>& chain = meters[(3 * hands.size() + i) * group].made;
@@ -133,7 +128,7 @@ FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOpt
     for (std::size_t h = 0; h < holdings.size(); ++h) {
       for (std::size_t i = 0; i < hands.size(); ++i) {
         const std::size_t ruler = (h * hands.size() + i) * group;
-        for (std::size_t m = 0; m < contestants.size(); ++m) {
+        for (std::size_t m = 0; m < options.contestants.size(); ++m) {
           Counted& counts = counted[m][h];
           for (std::size_t c = 0; c < meters[ruler].made.size(); ++c) {
             const double made = 1e3 * meters[ruler + 1 + m].made[c];
@@ -147,13 +142,14 @@ FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOpt
     }
   }
   FeelFigures figures;
-  for (std::size_t m = 0; m < contestants.size(); ++m) {
+  for (std::size_t m = 0; m < options.contestants.size(); ++m) {
     for (std::size_t h = 0; h < holdings.size(); ++h) {
       Counted& counts = counted[m][h];
       std::sort(counts.above.begin(), counts.above.end());
       const auto n = counts.above.size();
       const auto add = [&](std::string_view measure, double value) {
-        figures.push_back({contestants[m].name, holdings[h].loop, std::string(measure), value});
+        figures.push_back(
+            {options.contestants[m].name, holdings[h].loop, std::string(measure), value});
       };
       constexpr double much = 1e3 * PortEnergy::least_made;  // [mJ]
       const auto many = std::count_if(counts.above.begin(), counts.above.end(),

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scenes of `feel` with friction: a hand that slides, and hands that are drawn along and stick.
-#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,41 +12,40 @@
 namespace palpate::lab {
 namespace {
 
-// Plays one camera to a loop of each contestant.
-void play(const std::vector<OwnMethod>& contestants, const Parameters& parameters,
-          const std::string& camera_uri, double seconds, const std::function<HeldDevice()>& held,
+void play(const FeelOptions& options, const std::string& camera_uri, double seconds,
+          const std::function<HeldDevice()>& held,
           const std::function<void(std::size_t contestant, const Felt&)>& on_tick) {
   const FeelStage stage(camera_uri);
   const Truth truth = truth_of(stage.scene);
   std::vector<std::unique_ptr<TouchLoop>> loops;
-  for (const OwnMethod& contestant : contestants)
-    loops.push_back(straight_loop(contestant.make({parameters, truth}), held()));
+  for (const OwnMethod& contestant : options.contestants)
+    loops.push_back(straight_loop(contestant.make({options.parameters, truth}), held()));
   play_to(loops, stage.scenario(seconds), on_tick);
 }
 
-Parameters with_friction(Parameters parameters, double coefficient) {
-  parameters.friction.friction = coefficient;
-  return parameters;
+FeelOptions with_friction(FeelOptions options, double coefficient) {
+  options.parameters.friction.friction = coefficient;
+  return options;
 }
 
 }  // namespace
 
-FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOptions& options) {
+FeelFigures play_rub(const FeelOptions& options) {
   constexpr double from = 1.2;  // [s] sliding, after the first tenth
   const HipPath hand = sliding_hand();
   FeelRepeats repeats;
   for (const double coefficient : {0.1, 0.3, 0.6, 1.0}) {
-    const Parameters parameters = with_friction(options.parameters, coefficient);
+    const FeelOptions rough = with_friction(options, coefficient);
     // What the model says of the speed of 0.1 m/s.
-    const FrictionParameters& friction = parameters.friction;
+    const FrictionParameters& friction = rough.parameters.friction;
     const double faster = 0.1 / friction.stribeck_speed;
     const double kinetic = coefficient * (friction.kinetic_share + (1.0 - friction.kinetic_share) *
                                                                        std::exp(-faster * faster));
     for (int k = 0; k < options.repeats; ++k) {
-      std::vector<double> along(contestants.size(), 0.0);
-      std::vector<double> normal(contestants.size(), 0.0);
+      std::vector<double> along(options.contestants.size(), 0.0);
+      std::vector<double> normal(options.contestants.size(), 0.0);
       play(
-          contestants, parameters,
+          rough,
           fmt::format("synthetic:plane?distance=0.7m&sensor=d4xx&seed={}", options.seed_of(k)), 3.0,
           [&] { return on_path(hand); },
           [&](std::size_t i, const Felt& felt) {
@@ -55,9 +53,9 @@ FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOption
             along[i] -= felt.asked.x();
             normal[i] += felt.asked.z();
           });
-      for (std::size_t i = 0; i < contestants.size(); ++i) {
+      for (std::size_t i = 0; i < options.contestants.size(); ++i) {
         const double ratio = normal[i] > 0.0 ? along[i] / normal[i] : 0.0;
-        repeats.add({contestants[i].name, "path"}, "ratio",
+        repeats.add({options.contestants[i].name, "path"}, "ratio",
                     100.0 * std::abs(ratio / kinetic - 1.0));
       }
     }
@@ -65,8 +63,7 @@ FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOption
   return repeats.figures({{"ratio", largest}});
 }
 
-FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                       double stroke) {
+FeelFigures play_stick(const FeelOptions& options, double stroke) {
   constexpr double coefficient = 0.6;
   constexpr double press = 0.025;      // [m] the hand wants to be that far below the surface
   constexpr double seconds = 13.0;     // of which ten are watched
@@ -86,15 +83,16 @@ FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOpti
   // A device without friction of its own, which would hold the hand too, and as exact as an omega.
   DevicePreset device = device_preset("omega");
   device.body.friction = 0.0;
-  const Parameters parameters = with_friction(options.parameters, coefficient);
+  const FeelOptions rough = with_friction(options, coefficient);
   FeelRepeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = options.seed_of(k);
-    std::vector<std::vector<double>> first(contestants.size());  // [m] along, in the first second
-    std::vector<std::vector<double>> last(contestants.size());
-    std::vector<bool> held(contestants.size(), false);  // does it push to the end?
+    const std::size_t count = options.contestants.size();
+    std::vector<std::vector<double>> first(count);  // [m] along, in the first second
+    std::vector<std::vector<double>> last(count);
+    std::vector<bool> held(count, false);  // does it push to the end?
     play(
-        contestants, parameters,
+        rough,
         fmt::format("synthetic:plane?{}&stroke={}", camera_options(0.7, 0.3, "d4xx", seed), stroke),
         seconds, [&] { return in_hand(hand, grip, device, seed); },
         [&](std::size_t i, const Felt& felt) {
@@ -105,8 +103,8 @@ FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOpti
             first[i].push_back(felt.hip.x());
           }
         });
-    for (std::size_t i = 0; i < contestants.size(); ++i)
-      repeats.add({contestants[i].name, "light"}, "drift",
+    for (std::size_t i = 0; i < count; ++i)
+      repeats.add({options.contestants[i].name, "light"}, "drift",
                   held[i] ? 1e3 * std::abs(mean(last[i]) - mean(first[i]))
                           : std::numeric_limits<double>::infinity());
   }

@@ -34,9 +34,10 @@ const DevicePreset& touch() { return device_preset("touch"); }
 // sphere on the true surface: what an exact surface with the same spring would give.
 class Loops {
  public:
-  Loops(const std::vector<OwnMethod>& contestants, const Parameters& parameters,
-        const std::shared_ptr<const Scene>& scene)
-      : contestants_(contestants), parameters_(parameters), truth_(truth_of(scene)) {}
+  Loops(const FeelOptions& options, const std::shared_ptr<const Scene>& scene)
+      : contestants_(options.contestants),
+        parameters_(options.parameters),
+        truth_(truth_of(scene)) {}
 
   /// Each contestant gets a loop of this name. That of the chain is compared with the ruler's
   /// without a chain.
@@ -83,7 +84,6 @@ class Loops {
   std::vector<std::size_t> rulers_;
 };
 
-// The force of a loop over a stretch of time.
 struct Signal {
   std::vector<double> force;  // [N] magnitude
   std::vector<double> error;  // [N] of it, beside the true force where the hand is
@@ -148,6 +148,21 @@ double middle_of(std::span<const double> repeats) {
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
+std::shared_ptr<const Scene> covered_plane(double from, double to) {
+  constexpr double half = 0.3;    // [m] half of the board, along its way
+  constexpr double above = 0.15;  // [m] the surface
+  const double speed = 2.0 * half / (to - from);
+  Motion motion;
+  motion.direction = Vec3::UnitX();
+  motion.start = 0.5;
+  motion.speed = speed;
+  const double x = -half - speed * (from - motion.start);
+  return std::make_shared<const Scene>(
+      std::vector<Part>{{HalfSpace{}, Eigen::Isometry3d::Identity(), Motion{}},
+                        {block(Vec3(half, half, 0.005)),
+                         Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, above)), motion}});
+}
+
 }  // namespace
 
 FeelStage::FeelStage(const std::string& uri)
@@ -206,8 +221,7 @@ std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::st
   return std::make_shared<SyntheticCamera>(scene, plain->setup(), plain->sensor().model());
 }
 
-FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                       double distance) {
+FeelFigures play_slide(const FeelOptions& options, double distance) {
   constexpr double from = 1.2;
   const HipPath hand = sliding_hand();
   FeelRepeats repeats;
@@ -215,7 +229,7 @@ FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOpti
     const std::uint64_t seed = options.seed_of(k);
     const FeelStage stage(
         fmt::format("synthetic:plane?distance={}m&sensor=d4xx&seed={}", distance, seed));
-    Loops loops(contestants, options.parameters, stage.scene);
+    Loops loops(options, stage.scene);
     loops.add_usual(hand, seed, true);
     for (const auto& [i, signal] : signals(loops, stage.scenario(3.0), [&](std::string_view loop) {
            return loop == chain ? settled : from;
@@ -228,7 +242,7 @@ FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOpti
   return repeats.figures({{"felt", middle_of}, {"step", largest}, {"error", largest}});
 }
 
-FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOptions& options) {
+FeelFigures play_onset(const FeelOptions& options) {
   constexpr double speed = 0.05;   // [m/s]
   constexpr double watched = 0.4;  // [s]
   FeelRepeats repeats;
@@ -236,7 +250,7 @@ FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOpti
     const double start = settled + k / (options.phases * f_c);
     const FeelStage stage(fmt::format("synthetic:plane?start={}&speed={}&{}", start, speed,
                                       camera_options(middle, 0.3, "ideal", 1)));
-    Loops loops(contestants, options.parameters, stage.scene);
+    Loops loops(options, stage.scene);
     loops.add_usual(coming_down(0.0), options.seed * 100 + static_cast<std::uint64_t>(k), false);
     struct Seen {
       double fastest = 0.0;  // [m/s] as the method has it
@@ -263,28 +277,7 @@ FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOpti
       {{"overshoot", largest}, {"swing", middle_of, "swing-median"}, {"swing", largest}});
 }
 
-namespace {
-
-// A plane, and a board that covers it from `from` to `to`.
-std::shared_ptr<const Scene> covered_plane(double from, double to) {
-  constexpr double half = 0.3;    // [m] half of the board, along its way
-  constexpr double above = 0.15;  // [m] the surface
-  const double speed = 2.0 * half / (to - from);
-  Motion motion;
-  motion.direction = Vec3::UnitX();
-  motion.start = 0.5;
-  motion.speed = speed;
-  const double x = -half - speed * (from - motion.start);
-  return std::make_shared<const Scene>(
-      std::vector<Part>{{HalfSpace{}, Eigen::Isometry3d::Identity(), Motion{}},
-                        {block(Vec3(half, half, 0.005)),
-                         Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, above)), motion}});
-}
-
-}  // namespace
-
-FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                        Unseen why) {
+FeelFigures play_return(const FeelOptions& options, Unseen why) {
   constexpr double gone = 2.0;  // [s]
   const double back = why == Unseen::dropped ? gone + 10.0 / f_c : gone + 2.0;
   // From when on a speed counts: the handle has come to rest by then, if there is time.
@@ -302,7 +295,7 @@ FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOpt
         return t < gone || t > back ? std::optional(0.0) : std::nullopt;
       };
     }
-    Loops loops(contestants, options.parameters, stage.scene);
+    Loops loops(options, stage.scene);
     const HipPath hand = coming_down(0.0);
     loops.add(free_handle, [&] { return let_go(hand, touch(), gone); });
     loops.add(light, [&] { return in_hand(hand, grip_preset(light), touch(), seed); });
@@ -318,8 +311,7 @@ FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOpt
   return repeats.figures({{"kick", largest}});
 }
 
-FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                      double distance) {
+FeelFigures play_rest(const FeelOptions& options, double distance) {
   FeelOptions damped = options;
   damped.parameters.coupling.damping = 2.0;
   FeelOptions undamped = options;
@@ -330,11 +322,11 @@ FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptio
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = options.seed_of(k);
     const FeelStage stage("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed));
-    Loops loops(contestants, damped.parameters, stage.scene);
+    Loops loops(damped, stage.scene);
     loops.add_usual(hand, seed, true);
     for (const auto& [i, signal] : signals(loops, stage.scenario(settled + 2.0), from))
       repeats.add(loops.names[i], "felt", 1e3 * felt_rms_of_all(signal.force));
-    Loops without(contestants, undamped.parameters, stage.scene);
+    Loops without(undamped, stage.scene);
     without.add(path, [&] { return on_path(hand); });
     for (const auto& [i, signal] : signals(without, stage.scenario(settled + 2.0), from))
       repeats.add(without.names[i], "undamped", 1e3 * felt_rms_of_all(signal.force));
@@ -342,8 +334,7 @@ FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptio
   return repeats.figures({{"felt", middle_of}, {"undamped", middle_of}});
 }
 
-FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                      double rate) {
+FeelFigures play_rate(const FeelOptions& options, double rate) {
   constexpr std::array latencies = {0.0, 0.1, 0.15, 0.3, 0.5};  // [s]
   FeelRepeats repeats;
   FeelFigures figures;
@@ -355,7 +346,7 @@ FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptio
     const double from = down + settled;
     Scenario scenario = stage.scenario(from + 2.0);
     scenario.delay = [latency](std::uint64_t) { return std::optional(latency); };
-    Loops loops(contestants, options.parameters, stage.scene);
+    Loops loops(options, stage.scene);
     loops.add_usual(coming_down(down), seed, false);
     for (const auto& [i, signal] :
          signals(loops, scenario, [=](std::string_view) { return from; })) {

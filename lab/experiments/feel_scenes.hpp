@@ -31,6 +31,7 @@ using FeelFigures = std::vector<FeelFigure>;
 
 /// How a scene is played.
 struct FeelOptions {
+  std::vector<OwnMethod> contestants;
   Parameters parameters;
   std::uint64_t seed = 1;
   int repeats = 4;  ///< with other noise
@@ -89,32 +90,26 @@ class FeelRepeats {
 HipPath sliding_hand();
 
 /// Along a resting plane at 0.1 m/s before a D4xx. @param distance  [m] from the camera
-FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                       double distance);
+FeelFigures play_slide(const FeelOptions& options, double distance);
 /// A plane begins to come at 0.05 m/s before an exact camera.
-FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOptions& options);
+FeelFigures play_onset(const FeelOptions& options);
 /// The force comes back after a surface was not seen.
 enum class Unseen { covered, stopped, dropped };
-FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                        Unseen why);
+FeelFigures play_return(const FeelOptions& options, Unseen why);
 /// A resting plane before a D4xx with k_d = 2 N s/m. @param distance  [m] from the camera
-FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                      double distance);
+FeelFigures play_rest(const FeelOptions& options, double distance);
 /// A resting plane before a D4xx of one frame rate, at several latencies. @param rate  [Hz]
-FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                      double rate);
+FeelFigures play_rate(const FeelOptions& options, double rate);
 
 /// Along a resting plane at 0.1 m/s before a D4xx at 0.7 m, with friction of several coefficients.
-FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOptions& options);
+FeelFigures play_rub(const FeelOptions& options);
 /// A lightly held handle that is drawn along a plane before a D4xx at 0.7 m with half of what its
 /// friction holds. @param stroke  [m] by which the plane bobs, at 1 Hz; 0: it rests
-FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                       double stroke);
+FeelFigures play_stick(const FeelOptions& options, double stroke);
 
 /// Hands that press on a resting plane and come off again: the energy that each contact gives them,
 /// beside what it is on an exact surface; and what the chain adds there.
 /// @param distance  [m] from the camera  @param sensor  its, as of a synthetic camera
-FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
-                        double distance, const std::string& sensor);
+FeelFigures play_energy(const FeelOptions& options, double distance, const std::string& sensor);
 
 }  // namespace palpate::lab

@@ -14,7 +14,6 @@
 #include "lab/play.hpp"
 #include "lab/statistics.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -57,7 +56,6 @@ constexpr std::array measures = {
     Measure{"sine", "step", "N/ms", 0.03},
 };
 
-// Rows of the CSV for a scene, one a measure.
 std::string rows_of(std::string_view method, std::string_view scene,
                     const std::vector<std::pair<std::string_view, double>>& values) {
   std::string rows;
@@ -72,7 +70,6 @@ std::string rows_of(std::string_view method, std::string_view scene,
   return rows;
 }
 
-// What the contact was like, over all repeats of a scene.
 struct Watched {
   std::vector<double> error;   // [m] from the true surface to the contact, along its normal
   std::vector<double> normal;  // [rad] between the tick's normal and the true one
@@ -198,7 +195,6 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
   std::vector<int> counted(ticks, 0);
   for (int k = 0; k < repeats; ++k) {
     const double speed = k % 2 == 0 ? 0.1 : -0.1;
-    // Another phase of the frames each time.
     const double start = 1.5 + k / (repeats * f_c);
     const auto scene = std::make_shared<const Scene>(
         make_scene(Uri(fmt::format("synthetic:plane?start={}&speed={}", start, speed))));
@@ -273,10 +269,7 @@ std::string push_by_sine(const std::string& name, const ExperimentOptions& optio
 }
 
 std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<std::string_view> scenes;
-  for (const Measure& measure : measures)
-    if (scenes.empty() || scenes.back() != measure.scene) scenes.push_back(measure.scene);
-  check_families(options, "fidelity has no such scene", scenes);
+  check_families(options, "fidelity has no such scene", fidelity_scenes());
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
     // What plays a scene gets the method, the options, the scene's name and more.
@@ -313,6 +306,13 @@ Scores fidelity_scores(const Table& table) {
 }  // namespace
 
 std::span<const FidelityMeasure> fidelity_measures() { return measures; }
+
+std::vector<std::string_view> fidelity_scenes() {
+  std::vector<std::string_view> scenes;
+  for (const Measure& measure : measures)
+    if (scenes.empty() || scenes.back() != measure.scene) scenes.push_back(measure.scene);
+  return scenes;
+}
 
 bool is_without_chance(std::string_view scene) {
   return scene == "quiet-plane" || scene == "quiet-relief" || scene == "sine";

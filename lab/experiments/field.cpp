@@ -16,20 +16,11 @@
 namespace palpate::lab {
 namespace {
 
-// What a camera says of itself.
 SensorKind declared(field::SensorKind kind) {
-  switch (kind) {
-    case field::SensorKind::stereo:
-      return SensorKind::stereo;
-    case field::SensorKind::light:
-      return SensorKind::structured_light;
-    case field::SensorKind::flight:
-    case field::SensorKind::coarse:
-      return SensorKind::time_of_flight;
-    case field::SensorKind::exact:
-      break;
-  }
-  return SensorKind::unknown;
+  constexpr std::array<SensorKind, field::sensor_kinds> kinds = {
+      SensorKind::stereo, SensorKind::structured_light, SensorKind::time_of_flight,
+      SensorKind::time_of_flight, SensorKind::unknown};
+  return kinds[static_cast<std::size_t>(kind)];
 }
 
 std::string rows_of(const std::vector<std::string>& names, const field::FieldCase& c, int number,

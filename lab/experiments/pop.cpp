@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiment.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -21,12 +20,6 @@ constexpr int cases_a_row = 50;
 constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
-using MethodMaker = std::function<std::unique_ptr<Method>(const MethodSetup&)>;
-
-MethodMaker maker_of(const std::string& name, const std::vector<OwnMethod>& own) {
-  return [name, own](const MethodSetup& setup) { return make_method(name, setup, own); };
-}
-
 struct Outcome {
   ForceJudge force;
   bool lost = false;
@@ -36,9 +29,9 @@ struct Outcome {
   double caused = 0.0;  // [N] of it, by what passes: largest difference from the same without it
 };
 
-std::vector<double> forces_of(const MethodMaker& make, const PopStage& stage,
-                              const Parameters& parameters) {
-  const auto method = make({parameters, stage.truth});
+std::vector<double> forces_of(const std::string& name, const ExperimentOptions& options,
+                              const PopStage& stage) {
+  const auto method = make_method(name, {options.parameters, stage.truth}, options.own_methods);
   method->seat(stage.seat);
   std::vector<double> forces;
   play(*method, stage.scenario, [&](const Tick& tick) {
@@ -51,22 +44,22 @@ std::vector<double> forces_of(const MethodMaker& make, const PopStage& stage,
 // The proxy is behind if its centre is inside a body, in truth now and as the newest frame showed
 // it (between frames nobody can know), while the ruler's is not.
 // @param compare  play it without what passes, too, to say what that causes
-Outcome play_case(const MethodMaker& make, const PopCase& c, const Parameters& parameters,
+Outcome play_case(const std::string& name, const PopCase& c, const ExperimentOptions& options,
                   bool compare) {
-  const PopStage stage = find_pop_family(c.family).stage(c, parameters);
-  const auto method = make({parameters, stage.truth});
-  const auto ruler = make_method("ideal", {parameters, stage.truth});
+  const PopStage stage = find_pop_family(c.family).stage(c, options.parameters);
+  const auto method = make_method(name, {options.parameters, stage.truth}, options.own_methods);
+  const auto ruler = make_method("ideal", {options.parameters, stage.truth});
   method->seat(stage.seat);
   ruler->seat(stage.seat);
   const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;  // [ticks]
-  Outcome outcome{.force = {parameters.proxy.r_c(), stage.scenario.tick_rate, frame}};
+  Outcome outcome{.force = {options.parameters.proxy.r_c(), stage.scenario.tick_rate, frame}};
   int behind = 0;
   bool touched = false;
   double last_force = 0.0;
   double least = 1e9;
   double most = -1e9;
   const std::vector<double> undisturbed = compare && stage.undisturbed
-                                              ? forces_of(make, *stage.undisturbed, parameters)
+                                              ? forces_of(name, options, *stage.undisturbed)
                                               : std::vector<double>();
   std::size_t ticks = 0;
   play(*method, stage.scenario, [&](const Tick& tick) {
@@ -109,11 +102,11 @@ Outcome play_case(const MethodMaker& make, const PopCase& c, const Parameters& p
 
 // The simplest case that is still lost: each value in turn is made simple, or brought half way
 // there as often as it is still lost, until nothing more can be done. At most `most_tries` plays.
-PopCase shrink(const MethodMaker& make, PopCase c, const Parameters& parameters) {
+PopCase shrink(const std::string& name, PopCase c, const ExperimentOptions& options) {
   constexpr int most_tries = 60;
   int tries = 0;
   const auto still_lost = [&](const PopCase& simpler) {
-    return ++tries <= most_tries && play_case(make, simpler, parameters, false).lost;
+    return ++tries <= most_tries && play_case(name, simpler, options, false).lost;
   };
   for (bool simpler = true; simpler && tries < most_tries;) {
     simpler = false;
@@ -156,14 +149,12 @@ PopCase with_fixed(PopCase c, const std::vector<std::string>& fixed) {
 
 std::string row_of(const std::string& method, const PopFamily& family, int from, int count,
                    const std::function<PopCase(int)>& draw, const ExperimentOptions& options) {
-  const Parameters& parameters = options.parameters;
-  const MethodMaker make = maker_of(method, options.own_methods);
   int lost = 0, dipped = 0, noticeable = 0, ghosts = 0, numb = 0, wrong = 0, right = 0;
   double step = 0.0, change = 0.0, caused = 0.0, worst_ghost = 0.0;
   std::string first_not_right = "-", first = "-", simplest = "-";
   for (int i = from; i < from + count; ++i) {
     const PopCase c = draw(i);
-    const Outcome outcome = play_case(make, c, parameters, true);
+    const Outcome outcome = play_case(method, c, options, true);
     ghosts += outcome.force.ghost() ? 1 : 0;
     numb += outcome.force.numb() ? 1 : 0;
     wrong += outcome.force.wrong_side() ? 1 : 0;
@@ -171,7 +162,7 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
     if (outcome.lost) {
       if (lost++ > 0) continue;
       first = c.text();
-      simplest = shrink(make, c, parameters).text();
+      simplest = shrink(method, c, options).text();
       continue;
     }
     right += outcome.force.right() ? 1 : 0;
@@ -202,30 +193,22 @@ std::vector<const PopFamily*> families_of(const ExperimentOptions& options) {
 }
 
 std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  std::optional<PopCase> given;
+  if (!options.case_text.empty()) given = parse_pop_case(options.case_text);
+  const int cases = given ? 1 : options.cases.value_or(usual_cases);
+  const std::vector<const PopFamily*> families =
+      given ? std::vector{&find_pop_family(given->family)} : families_of(options);
   std::vector<Cell> cells;
-  if (!options.case_text.empty()) {
-    const PopCase c = parse_pop_case(options.case_text);
-    for (const std::string& name : methods_of(experiment, options))
-      cells.emplace_back([=] {
-        return row_of(
-            name, find_pop_family(c.family), 0, 1, [c](int) { return c; }, options);
-      });
-    return cells;
-  }
-  const int cases = options.cases.value_or(usual_cases);
-  const std::vector<const PopFamily*> families = families_of(options);
   for (const std::string& name : methods_of(experiment, options)) {
     for (const PopFamily* family : families) {
+      const auto draw = [=](int i) {
+        const auto index = static_cast<std::uint64_t>(i);
+        return given ? *given
+                     : with_fixed(draw_pop_case(*family, options.seed, index), options.fixed);
+      };
       for (int from = 0; from < cases; from += cases_a_row)
         cells.emplace_back([=] {
-          return row_of(
-              name, *family, from, std::min(cases_a_row, cases - from),
-              [&](int i) {
-                return with_fixed(
-                    draw_pop_case(*family, options.seed, static_cast<std::uint64_t>(i)),
-                    options.fixed);
-              },
-              options);
+          return row_of(name, *family, from, std::min(cases_a_row, cases - from), draw, options);
         });
     }
   }
@@ -324,8 +307,7 @@ void ForceJudge::add(const Tick& tick, const Tick& ruler, double clear) {
 }
 
 Judgement judge(const std::string& method, const PopCase& c, const ExperimentOptions& options) {
-  const Outcome outcome =
-      play_case(maker_of(method, options.own_methods), c, options.parameters, false);
+  const Outcome outcome = play_case(method, c, options, false);
   return {.held = !outcome.lost, .right = !outcome.lost && outcome.force.right()};
 }
 

@@ -66,6 +66,7 @@ struct FidelityMeasure {
   std::optional<double> aim;  ///< none: it is only shown
 };
 std::span<const FidelityMeasure> fidelity_measures();
+std::vector<std::string_view> fidelity_scenes();
 
 /// Has a scene no noise, so that every seed gives the same?
 bool is_without_chance(std::string_view scene);

@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 
 #include "lab/grid_cloud.hpp"
-#include "lab/method.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/mathematics.hpp"
@@ -27,28 +26,28 @@ using enum PopRange::Draw;
 // ---- Clouds of points on a grid, as in section 5. ----
 
 PopStage on_grid(const PopCase& c, const Parameters& parameters, Noise noise,
-                 std::function<double(double)> law, double duration) {
+                 std::function<double(double)> law, double duration,
+                 const std::function<double(double, double)>& relief = nullptr) {
   const double r_c = parameters.proxy.r_c();
   GridCloud grid = level_grid(r_c, 12.0 * r_c);
+  if (relief) grid.height = relief;
   grid.sigma = c["noise"];
   grid.noise = noise;
   grid.seed = c.seed;
   PopStage stage;
   stage.truth = flat_truth(law);
   const auto shown = stage.shown;
-  stage.scenario = {.duration = duration,
-                    .cloud =
-                        [=](std::uint64_t frame, double t) {
-                          *shown = t;
-                          return grid.capture(frame, law(t));
-                        },
-                    // 5.2: the hand waits at the origin; once the cloud has passed it, it keeps
-                    // 6 r_c below the cloud as the newest frame shows it.
-                    .hip =
-                        [=](double) {
-                          const double height = law(*shown);
-                          return Vec3(0.0, 0.0, height > 0.0 ? height - 6.0 * r_c : 0.0);
-                        }};
+  stage.scenario.duration = duration;
+  stage.scenario.cloud = [=](std::uint64_t frame, double t) {
+    *shown = t;
+    return grid.capture(frame, law(t));
+  };
+  // 5.2: the hand waits at the origin; once the cloud has passed it, it keeps 6 r_c below the cloud
+  // as the newest frame shows it.
+  stage.scenario.hip = [=](double) {
+    const double height = law(*shown);
+    return Vec3(0.0, 0.0, height > 0.0 ? height - 6.0 * r_c : 0.0);
+  };
   return stage;
 }
 
@@ -61,17 +60,6 @@ std::function<double(double)> lift_law(double r_c, double acceleration) {
   };
 }
 constexpr double lift_duration = 0.5 + 10.0 / f_c;
-
-}  // namespace
-
-PopStage grid_lift(const PopCase& c, const Parameters& parameters, Noise noise) {
-  PopStage stage = on_grid(c, parameters, noise,
-                           lift_law(parameters.proxy.r_c(), c["acceleration"]), lift_duration);
-  stage.judged_at_end = true;
-  return stage;
-}
-
-namespace {
 
 constexpr std::array lift_white_ranges = {PopRange{"noise", 0.0, 0.0, 0.010, even, 0.1},
                                           PopRange{"acceleration", 0.0, 0.0, 90.0, even, 1000.0}};
@@ -91,27 +79,19 @@ constexpr std::array lift_sphere_ranges = {PopRange{"noise", 0.0, 0.0, 0.010, ev
                                            PopRange{"acceleration", 0.0, 0.0, 7.0, even, 1000.0},
                                            PopRange{"radius", 0.080, 0.040, 0.080, even, 1.0}};
 PopStage lift_sphere(const PopCase& c, const Parameters& parameters) {
-  PopStage stage = lift_white(c, parameters);
   const double radius = c["radius"];
-  const double r_c = parameters.proxy.r_c();
-  const auto law = lift_law(r_c, c["acceleration"]);
+  const auto law = lift_law(parameters.proxy.r_c(), c["acceleration"]);
+  PopStage stage =
+      on_grid(c, parameters, Noise::white, law, lift_duration, [radius](double x, double y) {
+        const double squared = radius * radius - x * x - y * y;
+        return squared > 0.0 ? std::sqrt(squared) - radius : -radius;
+      });
+  stage.judged_at_end = true;
   stage.truth = [=](const Vec3& p, double t) {
     const Vec3 offset = p - Vec3(0.0, 0.0, law(t) - radius);
     const double distance = offset.norm();
     return TruePoint{distance - radius,
                      distance > 0.0 ? Vec3(offset / distance) : Vec3(Vec3::UnitZ())};
-  };
-  GridCloud grid = level_grid(r_c, 12.0 * r_c);
-  grid.sigma = c["noise"];
-  grid.seed = c.seed;
-  grid.height = [radius](double x, double y) {
-    const double squared = radius * radius - x * x - y * y;
-    return squared > 0.0 ? std::sqrt(squared) - radius : -radius;
-  };
-  const auto shown = stage.shown;
-  stage.scenario.cloud = [=](std::uint64_t frame, double t) {
-    *shown = t;
-    return grid.capture(frame, law(t));
   };
   return stage;
 }
@@ -200,24 +180,20 @@ PopStage in_sight(const PopCase& c, const std::shared_ptr<const Scene>& scene,
   const double first = std::max(height(hand.x, hand.y, 0.0), -0.3);
   const auto z = std::make_shared<double>(first + 0.060);
   stage.seat = Vec3(hand.x, hand.y, *z);
-  stage.scenario = {.frame_rate = setup.frame_rate,
-                    .duration = duration,
-                    .cloud =
-                        [=](std::uint64_t frame, double t) {
-                          *shown = t;
-                          return camera->capture(t, frame).cloud;
-                        },
-                    .hip =
-                        [=](double t) {
-                          const double x = hand.x + hand.along * std::max(t - contact_time, 0.0);
-                          const double surface = height(x, hand.y, *shown);
-                          const double above = std::max(0.15 * (contact_time - t), -hand.press);
-                          if (std::isfinite(surface)) {
-                            const double way = surface + above - *z;
-                            *z += std::clamp(way, -hand_speed * 1e-3, hand_speed * 1e-3);
-                          }
-                          return Vec3(x, hand.y, *z);
-                        }};
+  stage.scenario.frame_rate = setup.frame_rate;
+  stage.scenario.duration = duration;
+  stage.scenario.cloud = [=](std::uint64_t frame, double t) {
+    *shown = t;
+    return camera->capture(t, frame).cloud;
+  };
+  stage.scenario.hip = [=](double t) {
+    const double x = hand.x + hand.along * std::max(t - contact_time, 0.0);
+    const double surface = height(x, hand.y, *shown);
+    const double above = std::max(0.15 * (contact_time - t), -hand.press);
+    if (std::isfinite(surface))
+      *z += std::clamp(surface + above - *z, -hand_speed * 1e-3, hand_speed * 1e-3);
+    return Vec3(x, hand.y, *z);
+  };
   return stage;
 }
 
@@ -545,6 +521,13 @@ constexpr std::array families = {
     PopFamily{"late", "slow and late cameras, a plane at rest", late_ranges, late}};
 
 }  // namespace
+
+PopStage grid_lift(const PopCase& c, const Parameters& parameters, Noise noise) {
+  PopStage stage = on_grid(c, parameters, noise,
+                           lift_law(parameters.proxy.r_c(), c["acceleration"]), lift_duration);
+  stage.judged_at_end = true;
+  return stage;
+}
 
 double rounded(double value) { return std::strtod(fmt::format("{:.3g}", value).c_str(), nullptr); }
 

@@ -45,9 +45,8 @@ struct Recording {
   bool at_rest = true;
   std::vector<Place> places;
 
-  // Forth and back.
-  [[nodiscard]] const DepthImage& frame(std::uint64_t k) const {
-    return *frames[forth_and_back(k, frames.size())];
+  [[nodiscard]] const std::shared_ptr<const DepthImage>& frame(std::uint64_t k) const {
+    return frames[forth_and_back(k, frames.size())];
   }
 };
 
@@ -112,8 +111,6 @@ Recording open_recording(const std::string& uri, std::size_t most = most_places)
   if (recording.frames.empty()) throw Error(uri, "it has no frames", "give another recording");
   recording.rate = source->info().frame_rate.value_or(30.0);
   const DepthImage& first = *recording.frames.front();
-  const DepthImage mean =
-      recording.frames.size() < 2 ? mean_of({recording.frames.front()}) : mean_of(recording.frames);
   // At rest: half of what the last frame measured is within 8 mm of what the first did.
   const auto& a = first.depth();
   const auto& b = recording.frames.back()->depth();
@@ -126,8 +123,8 @@ Recording open_recording(const std::string& uri, std::size_t most = most_places)
                    change.end());
   recording.at_rest = change[change.size() / 2] <= 0.008 * first.units_per_metre();
 
-  const DepthImage first_alone = mean_of({recording.frames.front()});
-  const DepthImage& image = recording.at_rest ? mean : first_alone;
+  const DepthImage image =
+      recording.at_rest ? mean_of(recording.frames) : mean_of({recording.frames.front()});
   std::vector<Place> all;
   const Intrinsics& k = image.intrinsics();
   for (int v = k.height / 8; v < 7 * k.height / 8; v += 20) {
@@ -145,7 +142,6 @@ Recording open_recording(const std::string& uri, std::size_t most = most_places)
   return recording;
 }
 
-// What is done at a place, and what moves.
 enum class Action { hold, slide, moving, sweep };
 constexpr std::array action_names = {"hold", "slide", "moving", "sweep"};
 
@@ -206,7 +202,6 @@ std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place&
                                             frame.world_from_camera());
 }
 
-// What became of a contact.
 struct Outcome {
   ForceJudge force;
   bool lost = false;
@@ -247,18 +242,14 @@ Outcome touch(const std::string& name, const ExperimentOptions& options, const R
   double last_force = 0.0;
   std::vector<double> error;
   std::vector<double> force;
-  const Scenario scenario{.frame_rate = recording.rate,
-                          .duration = duration_of(action),
-                          .cloud =
-                              [&](std::uint64_t k, double t) {
-                                const DepthImage& recorded = recording.frame(k + motion.first);
-                                image = moves && t >= onset ? composed(recorded, place, motion, t)
-                                                            : std::shared_ptr<const DepthImage>(
-                                                                  &recorded, [](const auto*) {});
-                                shown = t;
-                                return image;
-                              },
-                          .hip = hip};
+  const auto cloud = [&](std::uint64_t k, double t) {
+    image = recording.frame(k + motion.first);
+    if (moves && t >= onset) image = composed(*image, place, motion, t);
+    shown = t;
+    return image;
+  };
+  const Scenario scenario{
+      .frame_rate = recording.rate, .duration = duration_of(action), .cloud = cloud, .hip = hip};
   const double frame = scenario.tick_rate / scenario.frame_rate;
   Outcome outcome{.force = {r_c, scenario.tick_rate, frame}};
   play(*method, scenario, [&](const Tick& tick) {

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "lab/experiment.hpp"
-#include "lab/implicit_proxy.hpp"
+#include "lab/implicit_method.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/statistics.hpp"

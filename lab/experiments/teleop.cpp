@@ -74,12 +74,85 @@ HipPath hand_of(std::string_view name, TeleopScene& scene) {
 }
 
 LinkQuality link_of(double round_trip, bool poor) {
-  LinkQuality link{.delay = 0.5 * round_trip};
-  if (poor) {
-    link.jitter = std::min(jitter, link.delay);
-    link.loss = loss;
+  const double delay = 0.5 * round_trip;
+  if (!poor) return {.delay = delay};
+  return {.delay = delay, .jitter = std::min(jitter, delay), .loss = loss};
+}
+
+std::string rows_of(std::string_view name, std::string_view sensor, std::string_view way,
+                    const ExperimentOptions& options) {
+  std::string rows;
+  for (const double round_trip : round_trips) {
+    for (const bool poor : {false, true}) {
+      if (poor && round_trip == 0.0) continue;
+      const TeleopCase one{.way = way,
+                           .up = link_of(round_trip, poor),
+                           .down = link_of(round_trip, poor),
+                           .parameters = options.parameters,
+                           .seed = options.seed};
+      const TeleopFigures figures = play_teleop_case(teleop_scene(name, sensor, options.seed), one);
+      rows += csv_row(way, name, sensor, 1e3 * round_trip, poor ? "poor" : "even", figures.force,
+                      figures.most_force, 1e3 * figures.shake, 1e3 * figures.energy,
+                      1e3 * figures.depth, figures.contact, 1e3 * figures.swing);
+    }
   }
-  return link;
+  return rows;
+}
+
+std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  check_families(options, "teleop has no such scene", scenes);
+  std::vector<Cell> cells;
+  std::vector<std::string> ways = options.methods;
+  if (ways.empty())
+    ways.assign(experiment.default_methods.begin(), experiment.default_methods.end());
+  for (const std::string& way : ways) {
+    const auto* const known_way = std::find(teleop_ways.begin(), teleop_ways.end(), way);
+    if (known_way == teleop_ways.end())
+      throw Error("--methods " + way, "teleop has no such coupling",
+                  did_you_mean(way, teleop_ways));
+    for (const std::string_view scene : scenes) {
+      if (!options.wants(scene)) continue;
+      for (const std::string_view sensor : sensors) {
+        // Those without a camera have no sensor.
+        if (*known_way != "palpate" && sensor != sensors.front()) continue;
+        cells.emplace_back([=, way = *known_way] { return rows_of(scene, sensor, way, options); });
+      }
+    }
+  }
+  return cells;
+}
+
+// The worst over links with and without jitter and loss, by delay.
+Scores teleop_scores(const Table& table) {
+  // What only says something where the hand presses.
+  const auto pressed = [](const Column& column) {
+    return Column{column.title, [=](const Table& group) {
+                    return group.number(0, "force") > 0.0 ? column.text(group) : "-";
+                  }};
+  };
+  const auto most = [](std::string title, std::string_view column, std::string_view format) {
+    return shown(std::move(title), {column}, format, 1.0, largest);
+  };
+  const auto range = [](const Table& group) {
+    const std::vector<double> forces = group.numbers("force");
+    const auto [low, high] = std::minmax_element(forces.begin(), forces.end());
+    return fmt::format("{:.2f} to {:.2f}", *low, *high);
+  };
+  const auto worst = [](const Table& group) {
+    double off = 0.0;
+    for (const double force : group.numbers("force"))
+      off = std::max(off, std::abs(force / group.number(0, "force") - 1.0));
+    return fmt::format("{:.1f}", 100.0 * off);
+  };
+  return scores_by(
+      table, {"way", "scene", "sensor"},
+      {pressed({"force [N], 0 to 500 ms", range}), pressed({"worst, %", worst}),
+       most("shake [mm]", "shake", "{:.3f}"), pressed(most("made [mJ]", "energy", "{:.2f}")),
+       most("depth [mm]", "depth", "{:.2f}"), most("contact [N]", "contact", "{:.1f}"),
+       pressed(most("tool's swing [mm]", "swing", "{:.2f}"))},
+      "The worst of round trips from 0 to 500 ms, with and without jitter of 30 ms and 5 % loss. "
+      "Worst, %: of the force against that without delay. Aims: 5 %, 0.05 mm, 0.1 mJ; depth 0.5 mm "
+      "(rest), 1 mm (bob, come); 5 N. Measures: docs/teleop.md.");
 }
 
 }  // namespace
@@ -135,86 +208,6 @@ TeleopFigures play_teleop_case(const TeleopScene& scene, const TeleopCase& one) 
   figures.force = median(std::move(forces));
   return figures;
 }
-
-namespace {
-
-std::string rows_of(std::string_view name, std::string_view sensor, std::string_view way,
-                    const ExperimentOptions& options) {
-  std::string rows;
-  for (const double round_trip : round_trips) {
-    for (const bool poor : {false, true}) {
-      if (poor && round_trip == 0.0) continue;
-      const TeleopCase one{.way = way,
-                           .up = link_of(round_trip, poor),
-                           .down = link_of(round_trip, poor),
-                           .parameters = options.parameters,
-                           .seed = options.seed};
-      const TeleopFigures figures = play_teleop_case(teleop_scene(name, sensor, options.seed), one);
-      rows += csv_row(way, name, sensor, 1e3 * round_trip, poor ? "poor" : "even", figures.force,
-                      figures.most_force, 1e3 * figures.shake, 1e3 * figures.energy,
-                      1e3 * figures.depth, figures.contact, 1e3 * figures.swing);
-    }
-  }
-  return rows;
-}
-
-std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  check_families(options, "teleop has no such scene", scenes);
-  std::vector<Cell> cells;
-  std::vector<std::string> ways = options.methods;
-  if (ways.empty())
-    ways.assign(experiment.default_methods.begin(), experiment.default_methods.end());
-  for (const std::string& way : ways) {
-    const auto& known = teleop_ways();
-    const auto known_way = std::find(known.begin(), known.end(), way);
-    if (known_way == known.end())
-      throw Error("--methods " + way, "teleop has no such coupling", did_you_mean(way, known));
-    for (const std::string_view scene : scenes) {
-      if (!options.wants(scene)) continue;
-      for (const std::string_view sensor : sensors) {
-        // Those without a camera have no sensor.
-        if (*known_way != "palpate" && sensor != sensors.front()) continue;
-        cells.emplace_back([=, way = *known_way] { return rows_of(scene, sensor, way, options); });
-      }
-    }
-  }
-  return cells;
-}
-
-// The worst over links with and without jitter and loss, by delay.
-Scores teleop_scores(const Table& table) {
-  // What only says something where the hand presses.
-  const auto pressed = [](const Column& column) {
-    return Column{column.title, [=](const Table& group) {
-                    return group.number(0, "force") > 0.0 ? column.text(group) : "-";
-                  }};
-  };
-  const auto most = [](std::string title, std::string_view column, std::string_view format) {
-    return shown(std::move(title), {column}, format, 1.0, largest);
-  };
-  const auto range = [](const Table& group) {
-    const std::vector<double> forces = group.numbers("force");
-    const auto [low, high] = std::minmax_element(forces.begin(), forces.end());
-    return fmt::format("{:.2f} to {:.2f}", *low, *high);
-  };
-  const auto worst = [](const Table& group) {
-    double off = 0.0;
-    for (const double force : group.numbers("force"))
-      off = std::max(off, std::abs(force / group.number(0, "force") - 1.0));
-    return fmt::format("{:.1f}", 100.0 * off);
-  };
-  return scores_by(
-      table, {"way", "scene", "sensor"},
-      {pressed({"force [N], 0 to 500 ms", range}), pressed({"worst, %", worst}),
-       most("shake [mm]", "shake", "{:.3f}"), pressed(most("made [mJ]", "energy", "{:.2f}")),
-       most("depth [mm]", "depth", "{:.2f}"), most("contact [N]", "contact", "{:.1f}"),
-       pressed(most("tool's swing [mm]", "swing", "{:.2f}"))},
-      "The worst of round trips from 0 to 500 ms, with and without jitter of 30 ms and 5 % loss. "
-      "Worst, %: of the force against that without delay. Aims: 5 %, 0.05 mm, 0.1 mJ; depth 0.5 mm "
-      "(rest), 1 mm (bob, come); 5 N. Measures: docs/teleop.md.");
-}
-
-}  // namespace
 
 Experiment teleop_experiment() {
   return {.name = "teleop",

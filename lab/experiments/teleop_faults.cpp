@@ -10,7 +10,6 @@
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/experiments/teleop.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -63,6 +62,57 @@ HipPath wander(Chance& chance) {
     place = to;
   }
   return HipPath(std::move(path));
+}
+
+std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
+                                const ExperimentOptions& options) {
+  check_families(options, "teleop-faults has no such fault", faults);
+  std::vector<Cell> cells;
+  const int cases = options.cases.value_or(usual_cases);
+  for (const std::string_view fault : faults) {
+    if (!options.wants(fault)) continue;
+    for (int first = 0; first < cases; first += cases_a_cell)
+      cells.emplace_back([=, seed = options.seed, last = std::min(first + cases_a_cell, cases)] {
+        std::string rows;
+        for (int i = first; i < last; ++i) {
+          const std::uint64_t number = seed * 1000000 + static_cast<std::uint64_t>(i);
+          const TeleopEpisode episode = teleop_episode(fault, number);
+          const EpisodeFigures figures = play_episode(episode);
+          rows += csv_row(fault, episode.moves ? "moves" : "rests", episode.sensor, number,
+                          1e3 * figures.breach, figures.contact, figures.unseen, figures.rise,
+                          figures.force, 1e3 * figures.stop.value_or(0.0));
+        }
+        return rows;
+      });
+  }
+  return cells;
+}
+
+Scores episode_scores(const Table& table) {
+  std::vector<Table> groups;
+  for (const std::string_view fault : faults)
+    for (const std::string_view scene : {"rests", "moves"})
+      groups.push_back(table.where({{"fault", fault}, {"scene", scene}}));
+  std::erase_if(groups, [](const Table& group) { return group.rows() == 0; });
+  const auto above = [](std::string title, std::string_view column, double limit) {
+    return Column{std::move(title), [=](const Table& group) {
+                    const std::vector<double> values = group.numbers(column);
+                    return std::to_string(std::count_if(
+                        values.begin(), values.end(), [=](double value) { return value > limit; }));
+                  }};
+  };
+  return scores_of(
+      groups, {"fault", "scene"},
+      {{"episodes", [](const Table& group) { return std::to_string(group.rows()); }},
+       above("breach > 0.5 mm", "breach", 0.5),
+       shown("worst [mm]", {"breach"}, "{:.2f}", 1.0, largest),
+       above("contact > 5 N", "contact", 5.0),
+       shown("worst [N]", {"contact"}, "{:.1f}", 1.0, largest),
+       above("unseen > 5 N", "unseen", 5.0),
+       shown("rise [N/ms]", {"rise"}, "{:.3f}", 1.0, largest),
+       shown("stops within [ms]", {"stop"}, "{:.0f}", 1.0, largest)},
+      "Stops within: until the tool is slower than 10 mm/s. Unseen: a surface that moves while the "
+      "camera sends no frames. Measures: docs/teleop.md.");
 }
 
 }  // namespace
@@ -144,61 +194,6 @@ EpisodeFigures play_episode(const TeleopEpisode& episode) {
   });
   return figures;
 }
-
-namespace {
-
-std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
-                                const ExperimentOptions& options) {
-  check_families(options, "teleop-faults has no such fault", faults);
-  std::vector<Cell> cells;
-  const int cases = options.cases.value_or(usual_cases);
-  for (const std::string_view fault : faults) {
-    if (!options.wants(fault)) continue;
-    for (int first = 0; first < cases; first += cases_a_cell)
-      cells.emplace_back([=, seed = options.seed, last = std::min(first + cases_a_cell, cases)] {
-        std::string rows;
-        for (int i = first; i < last; ++i) {
-          const std::uint64_t number = seed * 1000000 + static_cast<std::uint64_t>(i);
-          const TeleopEpisode episode = teleop_episode(fault, number);
-          const EpisodeFigures figures = play_episode(episode);
-          rows += csv_row(fault, episode.moves ? "moves" : "rests", episode.sensor, number,
-                          1e3 * figures.breach, figures.contact, figures.unseen, figures.rise,
-                          figures.force, 1e3 * figures.stop.value_or(0.0));
-        }
-        return rows;
-      });
-  }
-  return cells;
-}
-
-Scores episode_scores(const Table& table) {
-  std::vector<Table> groups;
-  for (const std::string_view fault : faults)
-    for (const std::string_view scene : {"rests", "moves"})
-      groups.push_back(table.where({{"fault", fault}, {"scene", scene}}));
-  std::erase_if(groups, [](const Table& group) { return group.rows() == 0; });
-  const auto above = [](std::string title, std::string_view column, double limit) {
-    return Column{std::move(title), [=](const Table& group) {
-                    const std::vector<double> values = group.numbers(column);
-                    return std::to_string(std::count_if(
-                        values.begin(), values.end(), [=](double value) { return value > limit; }));
-                  }};
-  };
-  return scores_of(
-      groups, {"fault", "scene"},
-      {{"episodes", [](const Table& group) { return std::to_string(group.rows()); }},
-       above("breach > 0.5 mm", "breach", 0.5),
-       shown("worst [mm]", {"breach"}, "{:.2f}", 1.0, largest),
-       above("contact > 5 N", "contact", 5.0),
-       shown("worst [N]", {"contact"}, "{:.1f}", 1.0, largest),
-       above("unseen > 5 N", "unseen", 5.0),
-       shown("rise [N/ms]", {"rise"}, "{:.3f}", 1.0, largest),
-       shown("stops within [ms]", {"stop"}, "{:.0f}", 1.0, largest)},
-      "Stops within: until the tool is slower than 10 mm/s. Unseen: a surface that moves while the "
-      "camera sends no frames. Measures: docs/teleop.md.");
-}
-
-}  // namespace
 
 Experiment teleop_faults_experiment() {
   return {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,7 +10,6 @@
 #include "lab/experiment.hpp"
 #include "lab/experiments/tool_bench.hpp"
 #include "lab/statistics.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -195,9 +193,7 @@ std::string row_of(const PressCase& one, const std::string& sensor, std::string_
 
 std::vector<Cell> tool_cells(const Experiment& /*experiment*/, const ExperimentOptions& options) {
   const std::vector<PressCase> cases = press_cases();
-  std::vector<std::string_view> names;
-  for (const PressCase& one : cases) names.push_back(one.name);
-  check_families(options, "tool has no such case", names);
+  check_families(options, "tool has no such case", names_of(cases));
   std::vector<Cell> cells;
   for (const PressCase& one : cases) {
     if (!options.wants(one.name)) continue;

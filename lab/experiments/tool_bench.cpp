@@ -20,7 +20,6 @@ namespace {
 
 constexpr double deepest = 30e-3;  // [m] what is deeper is behind something else
 
-// The newest frame, seen from any place.
 struct Seen {
   const DepthImage& image;
   Eigen::Isometry3d camera_from_world = image.world_from_camera().inverse();

@@ -57,132 +57,6 @@ std::shared_ptr<const ToolShape> draw_tool(Chance& chance) {
   return make_tool(fmt::format("box:{}x{}x{}mm", a / 2, b / 2, d), {});
 }
 
-}  // namespace
-
-double clearance(const Scene& bodies, const ToolShape& tool, const HandPose& pose, double t) {
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < std::min(truth_points, tool.points().size()); ++k)
-    least = std::min(
-        least, bodies.signed_distance(pose.position + pose.orientation * tool.points()[k].at, t));
-  return least;
-}
-
-ToolCase draw_tool_case(std::string_view family, std::uint64_t seed) {
-  Chance chance = chance_of(family, seed, 0);
-  ToolCase one;
-  one.noise_seed = seed;
-  // The part of a camera's image that a tool looks at, 128 cells of two pixels; or to where it may
-  // be pushed.
-  Intrinsics& image = one.camera.intrinsics;
-  image.fx = image.fy = CameraSetup{}.intrinsics.fx;
-  image.width = image.height = family == "coming" || family == "sliding" ? 400 : 256;
-  image.cx = image.cy = 0.5 * (image.width - 1);
-  const double distance = chance(0.45, 0.95);
-  const double tilt = chance(0.0, 0.5);
-  one.camera.world_from_camera = looking_at_origin(distance, tilt, chance(0.0, turn));
-  one.sigma = reading_sigma(distance);
-  one.tool = draw_tool(chance);
-  const double leans = chance(0.0, turn);
-  const double spin = chance(0.0, turn);
-  const Vec3 across(std::cos(leans), std::sin(leans), 0.0);
-  const Rotation held = rotation_by(chance(0.0, 0.6) * across) * rotation_by({0.0, 0.0, spin});
-  one.bodies = {part(HalfSpace{})};
-  const double heading = chance(0.0, turn);
-  const Vec3 ahead(std::cos(heading), std::sin(heading), 0.0);
-  const double reach = one.tool->reach();
-
-  // Drawn one after the other, whatever the compiler's order of arguments.
-  const auto between = [&](const Vec3& low, const Vec3& high) {
-    Vec3 drawn;
-    for (int axis = 0; axis < 3; ++axis) drawn[axis] = chance(low[axis], high[axis]);
-    return drawn;
-  };
-  // Waits clear of everything, comes down and presses; `depth` below 0: it stays above.
-  constexpr double waits = 0.25, comes_down = 0.2, high = 0.03, settles = 0.3;
-  const auto press = [&](double depth) {
-    HandPose at{between({-0.01, -0.01, 0.0}, {0.01, 0.01, 0.0}), held};
-    at.position.z() = touching_height(Scene(one.bodies), *one.tool, at) - depth;
-    const Vec3 above = at.position + (high + std::max(depth, 0.0)) * Vec3::UnitZ();
-    one.hand = {{0.0, above, held}, {waits, above, held}, {waits + comes_down, at.position, held}};
-    one.rests = waits + comes_down + settles + chance(0.0, 1.0 / 30.0);
-    return at.position;
-  };
-  if (family == "coming") {
-    press(chance(-0.02, 8e-3));
-    one.bodies[0].motion = {.start = one.rests, .speed = 0.5};
-    one.ends = one.rests + 0.36;
-  } else if (family == "sliding") {
-    const Vec3 at = press(chance(2e-3, 8e-3));
-    const double speed = chance(0.1, 0.4);
-    // Lower than what may strike a surface, and higher than what noise explains.
-    const double lowest = 0.01 + 3.0 * one.sigma;
-    const Vec3 half = between({0.02, 0.015, 0.5 * lowest}, {0.05, 0.05, 0.03});
-    const double gap = reach + chance(0.03, 0.06);
-    Vec3 from = at - (gap + half.x()) * ahead + chance(-0.015, 0.015) * ahead.cross(Vec3::UnitZ());
-    from.z() = half.z();
-    one.bodies.push_back(part(block(half), from, {0, 0, heading}));
-    one.bodies[1].motion = {.direction = ahead, .start = one.rests, .speed = speed};
-    one.ends = one.rests + (gap + reach + 0.05) / speed;
-  } else if (family == "passing") {
-    const Vec3 at = press(chance(2e-3, 8e-3));
-    const double radius = chance(0.02, 0.035);
-    const double height = radius + chance(0.12, 0.18);
-    const double hidden = chance(0.1, 0.5);
-    const Vec3 eye = one.camera.world_from_camera.translation();
-    const double share = height / eye.z();  // of the line of sight
-    const double speed = 2.0 * (radius + (1.0 - share) * reach) / hidden;
-    const double way = (1.0 - share) * 0.45 * distance + radius + 0.02;  // to beyond the image
-    const Vec3 over = Vec3(at.x(), at.y(), 0.0) + share * (eye - Vec3(at.x(), at.y(), 0.0));
-    one.arms = {part(Capsule{radius, 0.4}, over - way * ahead, {0, 0, heading})};
-    one.arms[0].motion = {.direction = ahead, .start = one.rests, .speed = speed};
-    one.ends = one.rests + 2.0 * way / speed + 0.1;
-  } else {
-    if (chance() < 0.5) {
-      const Vec3 half = between({0.015, 0.015, 2.5e-3}, {0.04, 0.04, 0.02});
-      const Vec3 place = between({-0.04, -0.04, half.z()}, {0.04, 0.04, half.z()});
-      one.bodies.push_back(part(block(half), place, {0, 0, heading}));
-    }
-    one.lifts = 8;
-    const Scene bodies(one.bodies);
-    const double clear = 3.0 * one.sigma + margin;
-    HandPose at{Vec3::Zero(), held};
-    double t = 0.0;
-    const auto to = [&](const Vec3& place, double speed) {
-      t += std::max((place - one.hand.back().hip).norm() / speed, 0.02);
-      one.hand.push_back({t, place, held});
-    };
-    for (int i = 0; i < one.lifts; ++i) {
-      at.position = between({-0.025, -0.025, 0.0}, {0.025, 0.025, 0.0});
-      at.position.z() = touching_height(bodies, *one.tool, at);
-      const double above = clear + chance(0.01, 0.03);
-      const Vec3 aside = between({-0.015, -0.015, above}, {0.015, 0.015, above});
-      // Above where it comes down, so that nothing is met on the way there.
-      Vec3 start = at.position + above * Vec3::UnitZ();
-      if (one.hand.empty()) {
-        one.hand.push_back({0.0, start, held});
-        t = waits;
-        one.hand.push_back({t, start, held});
-      } else {
-        start.z() = std::max(start.z(), one.hand.back().hip.z());
-        to(start, 0.5);
-      }
-      const Vec3 deep = at.position - chance(2e-3, 8e-3) * Vec3::UnitZ();
-      to(deep, chance(0.15, 0.6));
-      t += chance(0.03, 0.1);
-      one.hand.push_back({t, deep, held});
-      to(at.position + aside, chance(0.15, 0.6));
-      t += 0.03;
-      one.hand.push_back({t, one.hand.back().hip, held});
-    }
-    one.rests = waits;
-    one.ends = t;
-  }
-  return one;
-}
-
-namespace {
-
-// What a method made of a case.
 struct ToolVerdict {
   double behind = 0.0;  // [s] the longest in one go
   int pulls = 0;        // of forces in free space
@@ -335,6 +209,127 @@ Scores tool_case_scores(const Table& table) {
 }
 
 }  // namespace
+
+double clearance(const Scene& bodies, const ToolShape& tool, const HandPose& pose, double t) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < std::min(truth_points, tool.points().size()); ++k)
+    least = std::min(
+        least, bodies.signed_distance(pose.position + pose.orientation * tool.points()[k].at, t));
+  return least;
+}
+
+ToolCase draw_tool_case(std::string_view family, std::uint64_t seed) {
+  Chance chance = chance_of(family, seed, 0);
+  ToolCase one;
+  one.noise_seed = seed;
+  // The part of a camera's image that a tool looks at, 128 cells of two pixels; or to where it may
+  // be pushed.
+  Intrinsics& image = one.camera.intrinsics;
+  image.fx = image.fy = CameraSetup{}.intrinsics.fx;
+  image.width = image.height = family == "coming" || family == "sliding" ? 400 : 256;
+  image.cx = image.cy = 0.5 * (image.width - 1);
+  const double distance = chance(0.45, 0.95);
+  const double tilt = chance(0.0, 0.5);
+  one.camera.world_from_camera = looking_at_origin(distance, tilt, chance(0.0, turn));
+  one.sigma = reading_sigma(distance);
+  one.tool = draw_tool(chance);
+  const double leans = chance(0.0, turn);
+  const double spin = chance(0.0, turn);
+  const Vec3 across(std::cos(leans), std::sin(leans), 0.0);
+  const Rotation held = rotation_by(chance(0.0, 0.6) * across) * rotation_by({0.0, 0.0, spin});
+  one.bodies = {part(HalfSpace{})};
+  const double heading = chance(0.0, turn);
+  const Vec3 ahead(std::cos(heading), std::sin(heading), 0.0);
+  const double reach = one.tool->reach();
+
+  // Drawn one after the other, whatever the compiler's order of arguments.
+  const auto between = [&](const Vec3& low, const Vec3& high) {
+    Vec3 drawn;
+    for (int axis = 0; axis < 3; ++axis) drawn[axis] = chance(low[axis], high[axis]);
+    return drawn;
+  };
+  // Waits clear of everything, comes down and presses; `depth` below 0: it stays above.
+  constexpr double waits = 0.25, comes_down = 0.2, high = 0.03, settles = 0.3;
+  const auto press = [&](double depth) {
+    HandPose at{between({-0.01, -0.01, 0.0}, {0.01, 0.01, 0.0}), held};
+    at.position.z() = touching_height(Scene(one.bodies), *one.tool, at) - depth;
+    const Vec3 above = at.position + (high + std::max(depth, 0.0)) * Vec3::UnitZ();
+    one.hand = {{0.0, above, held}, {waits, above, held}, {waits + comes_down, at.position, held}};
+    one.rests = waits + comes_down + settles + chance(0.0, 1.0 / 30.0);
+    return at.position;
+  };
+  if (family == "coming") {
+    press(chance(-0.02, 8e-3));
+    one.bodies[0].motion = {.start = one.rests, .speed = 0.5};
+    one.ends = one.rests + 0.36;
+  } else if (family == "sliding") {
+    const Vec3 at = press(chance(2e-3, 8e-3));
+    const double speed = chance(0.1, 0.4);
+    // Lower than what may strike a surface, and higher than what noise explains.
+    const double lowest = 0.01 + 3.0 * one.sigma;
+    const Vec3 half = between({0.02, 0.015, 0.5 * lowest}, {0.05, 0.05, 0.03});
+    const double gap = reach + chance(0.03, 0.06);
+    Vec3 from = at - (gap + half.x()) * ahead + chance(-0.015, 0.015) * ahead.cross(Vec3::UnitZ());
+    from.z() = half.z();
+    one.bodies.push_back(part(block(half), from, {0, 0, heading}));
+    one.bodies[1].motion = {.direction = ahead, .start = one.rests, .speed = speed};
+    one.ends = one.rests + (gap + reach + 0.05) / speed;
+  } else if (family == "passing") {
+    const Vec3 at = press(chance(2e-3, 8e-3));
+    const double radius = chance(0.02, 0.035);
+    const double height = radius + chance(0.12, 0.18);
+    const double hidden = chance(0.1, 0.5);
+    const Vec3 eye = one.camera.world_from_camera.translation();
+    const double share = height / eye.z();  // of the line of sight
+    const double speed = 2.0 * (radius + (1.0 - share) * reach) / hidden;
+    const double way = (1.0 - share) * 0.45 * distance + radius + 0.02;  // to beyond the image
+    const Vec3 over = Vec3(at.x(), at.y(), 0.0) + share * (eye - Vec3(at.x(), at.y(), 0.0));
+    one.arms = {part(Capsule{radius, 0.4}, over - way * ahead, {0, 0, heading})};
+    one.arms[0].motion = {.direction = ahead, .start = one.rests, .speed = speed};
+    one.ends = one.rests + 2.0 * way / speed + 0.1;
+  } else {
+    if (chance() < 0.5) {
+      const Vec3 half = between({0.015, 0.015, 2.5e-3}, {0.04, 0.04, 0.02});
+      const Vec3 place = between({-0.04, -0.04, half.z()}, {0.04, 0.04, half.z()});
+      one.bodies.push_back(part(block(half), place, {0, 0, heading}));
+    }
+    one.lifts = 8;
+    const Scene bodies(one.bodies);
+    const double clear = 3.0 * one.sigma + margin;
+    HandPose at{Vec3::Zero(), held};
+    double t = 0.0;
+    const auto to = [&](const Vec3& place, double speed) {
+      t += std::max((place - one.hand.back().hip).norm() / speed, 0.02);
+      one.hand.push_back({t, place, held});
+    };
+    for (int i = 0; i < one.lifts; ++i) {
+      at.position = between({-0.025, -0.025, 0.0}, {0.025, 0.025, 0.0});
+      at.position.z() = touching_height(bodies, *one.tool, at);
+      const double above = clear + chance(0.01, 0.03);
+      const Vec3 aside = between({-0.015, -0.015, above}, {0.015, 0.015, above});
+      // Above where it comes down, so that nothing is met on the way there.
+      Vec3 start = at.position + above * Vec3::UnitZ();
+      if (one.hand.empty()) {
+        one.hand.push_back({0.0, start, held});
+        t = waits;
+        one.hand.push_back({t, start, held});
+      } else {
+        start.z() = std::max(start.z(), one.hand.back().hip.z());
+        to(start, 0.5);
+      }
+      const Vec3 deep = at.position - chance(2e-3, 8e-3) * Vec3::UnitZ();
+      to(deep, chance(0.15, 0.6));
+      t += chance(0.03, 0.1);
+      one.hand.push_back({t, deep, held});
+      to(at.position + aside, chance(0.15, 0.6));
+      t += 0.03;
+      one.hand.push_back({t, one.hand.back().hip, held});
+    }
+    one.rests = waits;
+    one.ends = t;
+  }
+  return one;
+}
 
 Experiment tool_cases_experiment() {
   return {.name = "tool-cases",

@@ -14,7 +14,6 @@
 #include "lab/table.hpp"
 #include "palpate/io/devices/device_body.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -93,6 +92,92 @@ HipPath pressing(const Vec3& touched, const Grip& hand) {
                   {poke_at + poke_for, at(poked)},
                   {poke_at + poke_for + at_once, at(pressed)},
                   {duration + 1.0, at(pressed)}});
+}
+
+SampledWall wall_of(const ZHolding& holding, double damping) {
+  const DeviceBody& body = holding.device.body;
+  return {.handle = {.mass = body.mass + holding.hand.mass,
+                     .damping = body.damping + holding.hand.damping,
+                     .stiffness = holding.hand.stiffness},
+          .damping = damping,
+          .period = 1.0 / tick_rate,
+          .delay = body.delay};
+}
+
+std::string rows_of(std::string_view scene_name, std::string_view camera,
+                    const std::vector<ZHolding>& holdings, const std::vector<std::string>& names,
+                    const ExperimentOptions& options) {
+  const ZScene scene(scene_name, camera, options.seed);
+  std::vector<double> dampings = usual_dampings;
+  if (const double asked = options.parameters.coupling.damping; asked > 0.0) dampings = {asked};
+  std::string rows;
+  for (const ZHolding& holding : holdings) {
+    for (const double damping : dampings) {
+      const SampledWall wall = wall_of(holding, damping);
+      const double linear = linear_stiffness(wall, stiffest);
+      for (const std::string& method : names) {
+        // The true surface has no camera.
+        if (method == "ideal" && camera != cameras.front()) continue;
+        for (const bool chain : {false, true}) {
+          const ZLoop loop{&scene, &holding, method, damping, chain};
+          rows +=
+              csv_row(holding.name, holding.hand.name, scene_name, camera, method,
+                      chain ? "chain" : "straight", damping,
+                      largest_stiffness(loop, options.parameters), delayed_stiffness(wall), linear);
+        }
+      }
+    }
+  }
+  return rows;
+}
+
+std::vector<Cell> zwidth_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  check_families(options, "zwidth has no such scene", scenes);
+  const std::vector<std::string> names = methods_of(experiment, options);
+  std::vector<Cell> cells;
+  const std::vector<ZHolding> all = z_holdings();
+  for (const std::string_view scene : scenes) {
+    if (!options.wants(scene)) continue;
+    for (const std::string_view camera : cameras) {
+      for (auto first = all.begin(); first != all.end();) {
+        const auto last = std::find_if(
+            first, all.end(), [&](const ZHolding& one) { return one.name != first->name; });
+        cells.emplace_back([=, holdings = std::vector<ZHolding>(first, last)] {
+          return rows_of(scene, camera, holdings, names, options);
+        });
+        first = last;
+      }
+    }
+  }
+  return cells;
+}
+
+std::string stiffness_text(double stiffness) {
+  return stiffness >= stiffest ? fmt::format("> {:.0f}", stiffest)
+                               : fmt::format("{:.0f}", stiffness);
+}
+
+// Theory, and the range over all scenes of each method and way.
+Scores zwidth_scores(const Table& table) {
+  std::vector<Column> columns = {
+      {"k_d", [](const Table& group) { return group.text(0, "damping"); }},
+      shown("2(b+k_d)/(T+2t_d)", {"bound"}, "{:.0f}"),
+      {"linear", [](const Table& group) { return stiffness_text(group.number(0, "linear")); }}};
+  for (const std::string& method : texts_in(table, "method")) {
+    for (const std::string_view way : {"straight", "chain"}) {
+      columns.push_back(
+          {way == "chain" ? method + ", chain" : method, [=](const Table& group) {
+             const std::vector<double> values =
+                 group.numbers("stiffness", {{"method", method}, {"way", way}});
+             if (values.empty()) return std::string("-");
+             const auto [least, most] = std::minmax_element(values.begin(), values.end());
+             return stiffness_text(*least) + (*most > *least ? " to " + stiffness_text(*most) : "");
+           }});
+    }
+  }
+  return scores_of(table.by({"device", "hand", "damping"}), {"device", "hand"}, columns,
+                   "Largest stable stiffness [N/m], from the worst to the best of scenes and "
+                   "cameras; k_d in N s/m. Measures: docs/feel.md.");
 }
 
 }  // namespace
@@ -188,97 +273,6 @@ double largest_stiffness(const ZLoop& loop, const Parameters& parameters) {
   }
   return low;
 }
-
-namespace {
-
-SampledWall wall_of(const ZHolding& holding, double damping) {
-  const DeviceBody& body = holding.device.body;
-  return {.handle = {.mass = body.mass + holding.hand.mass,
-                     .damping = body.damping + holding.hand.damping,
-                     .stiffness = holding.hand.stiffness},
-          .damping = damping,
-          .period = 1.0 / tick_rate,
-          .delay = body.delay};
-}
-
-std::string rows_of(std::string_view scene_name, std::string_view camera,
-                    const std::vector<ZHolding>& holdings, const std::vector<std::string>& names,
-                    const ExperimentOptions& options) {
-  const ZScene scene(scene_name, camera, options.seed);
-  std::vector<double> dampings = usual_dampings;
-  if (const double asked = options.parameters.coupling.damping; asked > 0.0) dampings = {asked};
-  std::string rows;
-  for (const ZHolding& holding : holdings) {
-    for (const double damping : dampings) {
-      const SampledWall wall = wall_of(holding, damping);
-      const double linear = linear_stiffness(wall, stiffest);
-      for (const std::string& method : names) {
-        // The true surface has no camera.
-        if (method == "ideal" && camera != cameras.front()) continue;
-        for (const bool chain : {false, true}) {
-          const ZLoop loop{&scene, &holding, method, damping, chain};
-          rows +=
-              csv_row(holding.name, holding.hand.name, scene_name, camera, method,
-                      chain ? "chain" : "straight", damping,
-                      largest_stiffness(loop, options.parameters), delayed_stiffness(wall), linear);
-        }
-      }
-    }
-  }
-  return rows;
-}
-
-std::vector<Cell> zwidth_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  check_families(options, "zwidth has no such scene", scenes);
-  const std::vector<std::string> names = methods_of(experiment, options);
-  std::vector<Cell> cells;
-  const std::vector<ZHolding> all = z_holdings();
-  for (const std::string_view scene : scenes) {
-    if (!options.wants(scene)) continue;
-    for (const std::string_view camera : cameras) {
-      // A cell a device, with its hands.
-      for (auto first = all.begin(); first != all.end();) {
-        const auto last = std::find_if(
-            first, all.end(), [&](const ZHolding& one) { return one.name != first->name; });
-        cells.emplace_back([=, holdings = std::vector<ZHolding>(first, last)] {
-          return rows_of(scene, camera, holdings, names, options);
-        });
-        first = last;
-      }
-    }
-  }
-  return cells;
-}
-
-std::string stiffness_text(double stiffness) {
-  return stiffness >= stiffest ? fmt::format("> {:.0f}", stiffest)
-                               : fmt::format("{:.0f}", stiffness);
-}
-
-// Theory, and the range over all scenes of each method and way.
-Scores zwidth_scores(const Table& table) {
-  std::vector<Column> columns = {
-      {"k_d", [](const Table& group) { return group.text(0, "damping"); }},
-      shown("2(b+k_d)/(T+2t_d)", {"bound"}, "{:.0f}"),
-      {"linear", [](const Table& group) { return stiffness_text(group.number(0, "linear")); }}};
-  for (const std::string& method : texts_in(table, "method")) {
-    for (const std::string_view way : {"straight", "chain"}) {
-      columns.push_back(
-          {way == "chain" ? method + ", chain" : method, [=](const Table& group) {
-             const std::vector<double> values =
-                 group.numbers("stiffness", {{"method", method}, {"way", way}});
-             if (values.empty()) return std::string("-");
-             const auto [least, most] = std::minmax_element(values.begin(), values.end());
-             return stiffness_text(*least) + (*most > *least ? " to " + stiffness_text(*most) : "");
-           }});
-    }
-  }
-  return scores_of(table.by({"device", "hand", "damping"}), {"device", "hand"}, columns,
-                   "Largest stable stiffness [N/m], from the worst to the best of scenes and "
-                   "cameras; k_d in N s/m. Measures: docs/feel.md.");
-}
-
-}  // namespace
 
 Experiment zwidth_experiment() {
   return {.name = "zwidth",

@@ -117,7 +117,7 @@ std::function<Eigen::Isometry3d(double)> arm_motion(const Vec3& fingertips, doub
     const double in = ease((t - begin) / seconds);
     const double out = stays ? 0.0 : ease((t - begin - seconds - there) / seconds);
     return Eigen::Isometry3d(at(fingertips - (1.0 - in + out) * away * toward(heading)) *
-                             turned(heading, Vec3::UnitZ()));
+                             turned(heading));
   };
 }
 
@@ -180,7 +180,6 @@ void plane_slide(Draw& draw, Setting& setting, double start) {
   slide_on(draw, setting, start);
 }
 
-// Quick taps, and a press in the end.
 void plane_tap(Draw& draw, Setting& setting, double start) {
   setting.scene = plane_scene(draw);
   const Place place = below(setting.scene, 0.0, 0.0);
@@ -224,7 +223,6 @@ void bowl_slide(Draw& draw, Setting& setting, double start) {
                                        draw.by_factor("slide_speed", 0.05, 0.2)));
 }
 
-// Three planes that meet; the camera looks into the corner, the hand slides to the walls.
 void corner_slide(Draw& draw, Setting& setting, double start) {
   const double open_x = draw.even("open_x", 0.0, 0.25);
   const double open_y = draw.even("open_y", 0.0, 0.25);
@@ -378,7 +376,6 @@ void torso_rest(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift(place, p, start));
 }
 
-// Strokes with two taps, as one examines.
 void torso_palpate(Draw& draw, Setting& setting, double start) {
   setting.scene = torso_scene(draw);
   const Pressing p = pressing(draw, Vec3::UnitZ());
@@ -405,7 +402,6 @@ void terrain_slide(Draw& draw, Setting& setting, double start) {
   slide_on(draw, setting, start);
 }
 
-// A box on a belt arrives under a waiting hand and stays; the hand presses on it.
 void belt_under(Draw& draw, Setting& setting, double start) {
   const double height = draw.even("box", 0.02, 0.06);
   const Vec3 half(draw.even("box_x", 0.035, 0.06), draw.even("box_y", 0.035, 0.06), 0.5 * height);
@@ -416,7 +412,7 @@ void belt_under(Draw& draw, Setting& setting, double start) {
   const Vec3 to(0.0, 0.0, -0.5 * height);
   setting.scene = {still(ground(), at(0.0, 0.0, -height)),
                    moving(box(half), from_to(to - from * way, to, begin, seconds,
-                                             turned(draw.even("turn", 0.0, pi), Vec3::UnitZ())))};
+                                             turned(draw.even("turn", 0.0, pi))))};
   Pressing p = pressing(draw, Vec3::UnitZ());
   p.hover = draw.even("above", 0.03, 0.06);
   const Place place{Vec3(draw.even("x", -0.02, 0.02), draw.even("y", -0.02, 0.02), 0.0),
@@ -424,7 +420,6 @@ void belt_under(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift(place, p, begin + seconds + draw.even("pause", 0.0, 0.6)));
 }
 
-// A box arrives beside a hand that presses on the belt, and stays.
 void belt_beside(Draw& draw, Setting& setting, double start) {
   const double height = draw.even("box", 0.02, 0.08);
   const Vec3 half(draw.even("box_x", 0.03, 0.05), draw.even("box_y", 0.03, 0.06), 0.5 * height);
@@ -438,11 +433,10 @@ void belt_beside(Draw& draw, Setting& setting, double start) {
   const Pressing p = resting(draw, seconds);
   setting.scene = {still(ground()),
                    moving(box(half), from_to(to - from * way, to, start + settled(p), seconds,
-                                             turned(heading, Vec3::UnitZ())))};
+                                             turned(heading)))};
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
-// A long box goes by under a hand that rests on it, and stops.
 void belt_ride(Draw& draw, Setting& setting, double start) {
   const double height = draw.even("box", 0.02, 0.06);
   const double way = draw.even("way", 0.08, 0.14);
@@ -453,14 +447,12 @@ void belt_ride(Draw& draw, Setting& setting, double start) {
   const Vec3 middle = -0.5 * height * Vec3::UnitZ();
   const Vec3 half_way = 0.5 * way * toward(heading);
   const Pressing p = resting(draw, seconds);
-  setting.scene = {
-      still(ground(), at(0.0, 0.0, -height)),
-      moving(box(half), from_to(middle - half_way, middle + half_way, start + settled(p), seconds,
-                                turned(heading, Vec3::UnitZ())))};
+  setting.scene = {still(ground(), at(0.0, 0.0, -height)),
+                   moving(box(half), from_to(middle - half_way, middle + half_way,
+                                             start + settled(p), seconds, turned(heading)))};
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
-// A slanting board is pushed in under a hand that rests on the table, lifts it, and stays.
 void wedge_under(Draw& draw, Setting& setting, double start) {
   const double slope = draw.even("slope", 0.12, 0.35);
   const double lift = draw.even("lift", 0.010, 0.025);
@@ -473,7 +465,7 @@ void wedge_under(Draw& draw, Setting& setting, double start) {
   const double after = lift * cotangent(slope);
   const Vec3 way = toward(heading);
   const double seconds = seconds_for(before + after, draw.by_factor("push", 0.1, 0.3));
-  const Eigen::Isometry3d turn = turned(heading, Vec3::UnitZ()) * tilted;
+  const Eigen::Isometry3d turn = turned(heading) * tilted;
   const Pressing p = resting(draw, seconds);
   setting.scene = {still(ground()),
                    moving(box(Vec3(long_half, 0.07, thick_half)),
@@ -481,7 +473,6 @@ void wedge_under(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
-// A hand rests on a turntable; a dome on it passes under the hand, or stops there.
 void table_dome(Draw& draw, Setting& setting, double start) {
   const double out = draw.even("out", 0.06, 0.09);  // [m] of the hand and the dome from the axis
   const double cap = draw.even("cap", 0.008, 0.016);
@@ -491,7 +482,7 @@ void table_dome(Draw& draw, Setting& setting, double start) {
   const double fastest = draw.by_factor("turn_speed", 0.6, 1.8);
   const double seconds = seconds_for(before + after, fastest);
   const Vec3 axis = -out * Vec3::UnitX();
-  const Eigen::Isometry3d dome = turned(-before, Vec3::UnitZ()) * at(out, 0.0, cap - radius);
+  const Eigen::Isometry3d dome = turned(-before) * at(out, 0.0, cap - radius);
   const Pressing p = resting(draw, seconds);
   setting.scene = {
       still(cylinder(0.16, 0.015), at(axis - 0.015 * Vec3::UnitZ())),
@@ -500,7 +491,6 @@ void table_dome(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
-// A hand goes round with a thing on a turntable, pressing on it.
 void table_follow(Draw& draw, Setting& setting, double start) {
   const double out = draw.even("out", 0.03, 0.07);
   const double height = draw.even("thing", 0.02, 0.05);
@@ -510,7 +500,7 @@ void table_follow(Draw& draw, Setting& setting, double start) {
   const Pressing p = resting(draw, seconds);
   const double begin = start + settled(p);
   const int can = draw.whole("can", 2);
-  const Eigen::Isometry3d thing = turned(-0.5 * angle, Vec3::UnitZ()) * at(out, 0, -0.5 * height);
+  const Eigen::Isometry3d thing = turned(-0.5 * angle) * at(out, 0, -0.5 * height);
   setting.scene = {
       still(cylinder(0.16, 0.015), at(0.0, 0.0, -height - 0.015)),
       still(ground(), at(0.0, 0.0, -height - 0.03)),
@@ -528,7 +518,6 @@ void table_follow(Draw& draw, Setting& setting, double start) {
   play_script(setting, script);
 }
 
-// An arm reaches in over a hand that presses, and leaves after a moment, or stays.
 void arm_over(Draw& draw, Setting& setting, double start) {
   setting.scene = plane_scene(draw);
   const Vec3 over(0.0, 0.0, draw.even("over", 0.12, 0.2));
@@ -544,7 +533,6 @@ void arm_over(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
-// A visitor's hand is laid on the table under a waiting hand, which presses on it.
 void arm_under(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(ground(), at(0.0, 0.0, -0.038))};
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
@@ -585,7 +573,6 @@ void hover(Draw& draw, Setting& setting, double start) {
   play_script(setting, script);
 }
 
-// Down, along, and away as fast as a hand goes; then it stays in free space.
 void lift_off(Draw& draw, Setting& setting, double start) {
   setting.scene = any_scene(draw, {plane_scene, torso_scene, terrain_scene, cloth_scene});
   Pressing p = pressing(draw, Vec3::UnitZ());

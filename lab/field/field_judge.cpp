@@ -39,61 +39,83 @@ bool is_behind(const Vec3& proxy, const Ruling& ruling, const Snapshot& now, con
          shown.between(ruling.seen.proxy, proxy, 0.0) && now.between(ruling.now.proxy, proxy, 0.0);
 }
 
+class Judge {
+ public:
+  // @param interval  [s] from one frame to the next
+  explicit Judge(double interval) : interval_(interval) {}
+
+  // @param behind  the proxy is inside or behind a body, and the rulers' are not
+  void add(const Tick& tick, const Ruling& ruling, bool behind) {
+    const double force = tick.force.norm();
+    const double now = ruling.now.force.norm();
+    const double seen = ruling.seen.force.norm();
+    const auto lasted = [](int& ticks, bool goes_on) {
+      ticks = goes_on ? ticks + 1 : 0;
+      return ticks / tick_rate;
+    };
+    const double behind_for = lasted(behind_for_, behind && ruling.known);
+    verdict_.behind = std::max(verdict_.behind, behind_for);
+    verdict_.lost = verdict_.lost || behind_for > patience;
+
+    const double tick_time = 1.0 / tick_rate;
+    const bool alarm = (tick.flags & pop_through_suspected) != 0;
+    verdict_.time += tick_time;
+    if (behind_for > 0.0) {
+      verdict_.time_behind += tick_time;
+      verdict_.alarmed += alarm ? tick_time : 0.0;
+      verdict_.times_behind += back_for_ == 0.0 ? 1 : 0;
+    } else {
+      verdict_.false_alarm += alarm && !behind ? tick_time : 0.0;
+      verdict_.quick_returns += back_for_ > 0.0 && back_for_ <= quick ? 1 : 0;
+    }
+    back_for_ = behind_for;
+
+    const bool nothing = std::min(now, seen) > firm && force < least_share * std::min(now, seen);
+    verdict_.numb = lasted(numb_for_, nothing && ruling.known) > patience || verdict_.numb;
+
+    const auto against = [&](const Tick& ruler, double its) {
+      return tick.force.dot(ruler.force) < opposite * force * its;
+    };
+    const bool wrong = force > firm * least_share && std::min(now, seen) > has_side &&
+                       against(ruling.now, now) && against(ruling.seen, seen);
+    verdict_.wrong_side =
+        lasted(wrong_for_, wrong && ruling.known) > 0.05 + 1.5 * interval_ || verdict_.wrong_side;
+
+    if (ruling.free_in_sight && force > felt)
+      verdict_.worst_ghost = std::max(verdict_.worst_ghost, force);
+
+    const bool touching = now > 0.0 && seen > 0.0;
+    const double rested =
+        lasted(resting_for_, touching && ruling.rests && ruling.known && !behind) - settling;
+    if (rested > 0.0) {
+      rested_in_.extend(tick.proxy);
+      if (rested > long_rest)
+        verdict_.shake = std::max(verdict_.shake, rested_in_.diagonal().norm());
+    } else {
+      rested_in_.setEmpty();
+    }
+    if (touching && touched_)
+      verdict_.worst_step = std::max(verdict_.worst_step, (tick.force - last_force_).norm());
+    touched_ = touching;
+    last_force_ = tick.force;
+  }
+
+  [[nodiscard]] const Verdict& verdict() const { return verdict_; }
+
+ private:
+  double interval_;
+  Verdict verdict_;
+  int behind_for_ = 0;  // ticks in a row, as the others
+  int numb_for_ = 0;
+  int wrong_for_ = 0;
+  double back_for_ = 0.0;  // [s] that being behind has lasted
+  int resting_for_ = 0;
+  Eigen::AlignedBox3d rested_in_;
+  bool touched_ = false;
+  Vec3 last_force_ = Vec3::Zero();
+};
+
 }  // namespace
-
-void Judge::add(const Tick& tick, const Ruling& ruling, bool behind) {
-  const double force = tick.force.norm();
-  const double now = ruling.now.force.norm();
-  const double seen = ruling.seen.force.norm();
-  const auto lasted = [this](int& ticks, bool goes_on) {
-    ticks = goes_on ? ticks + 1 : 0;
-    return ticks / tick_rate_;
-  };
-  const double behind_for = lasted(behind_for_, behind && ruling.known);
-  verdict_.behind = std::max(verdict_.behind, behind_for);
-  verdict_.lost = verdict_.lost || behind_for > patience;
-
-  const double tick_time = 1.0 / tick_rate_;
-  const bool alarm = (tick.flags & pop_through_suspected) != 0;
-  verdict_.time += tick_time;
-  if (behind_for > 0.0) {
-    verdict_.time_behind += tick_time;
-    verdict_.alarmed += alarm ? tick_time : 0.0;
-    verdict_.times_behind += back_for_ == 0.0 ? 1 : 0;
-  } else {
-    verdict_.false_alarm += alarm && !behind ? tick_time : 0.0;
-    verdict_.quick_returns += back_for_ > 0.0 && back_for_ <= quick ? 1 : 0;
-  }
-  back_for_ = behind_for;
-
-  const bool nothing = std::min(now, seen) > firm && force < least_share * std::min(now, seen);
-  verdict_.numb = lasted(numb_for_, nothing && ruling.known) > patience || verdict_.numb;
-
-  const auto against = [&](const Tick& ruler, double its) {
-    return tick.force.dot(ruler.force) < opposite * force * its;
-  };
-  const bool wrong = force > firm * least_share && std::min(now, seen) > has_side &&
-                     against(ruling.now, now) && against(ruling.seen, seen);
-  verdict_.wrong_side =
-      lasted(wrong_for_, wrong && ruling.known) > 0.05 + 1.5 * interval_ || verdict_.wrong_side;
-
-  if (ruling.free_in_sight && force > felt)
-    verdict_.worst_ghost = std::max(verdict_.worst_ghost, force);
-
-  const bool touching = now > 0.0 && seen > 0.0;
-  const double rested =
-      lasted(resting_for_, touching && ruling.rests && ruling.known && !behind) - settling;
-  if (rested > 0.0) {
-    rested_in_.extend(tick.proxy);
-    if (rested > long_rest) verdict_.shake = std::max(verdict_.shake, rested_in_.diagonal().norm());
-  } else {
-    rested_in_.setEmpty();
-  }
-  if (touching && touched_)
-    verdict_.worst_step = std::max(verdict_.worst_step, (tick.force - last_force_).norm());
-  touched_ = touching;
-  last_force_ = tick.force;
-}
 
 Outcome play_field(Stage& stage, const std::vector<Method*>& methods, const Parameters& parameters,
                    const std::function<void(const Tick&, const Ruling&, bool)>& tick) {
@@ -120,7 +142,7 @@ Outcome play_field(Stage& stage, const std::vector<Method*>& methods, const Para
   ruler_seen->seat(seat);
   for (Method* method : methods) method->seat(seat);
 
-  std::vector<Judge> judges(methods.size(), Judge(tick_rate, stage.interval));
+  std::vector<Judge> judges(methods.size(), Judge(stage.interval));
   std::shared_ptr<const DepthImage> in_use;
   std::size_t next = 0;
   double last_known = 0.0;

@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #include "lab/field/field_cases.hpp"
 #include "palpate/kernel/core/method.hpp"
 
@@ -43,29 +41,6 @@ struct Ruling {
   bool known = true;
   bool free_in_sight = false;  ///< the hand is seen to be in free space
   bool rests = false;          ///< hand and rulers' proxies have not moved since the tick before
-};
-
-/// Judges a method, tick by tick.
-class Judge {
- public:
-  /// @param tick_rate  [Hz] @param interval  [s] from one frame to the next
-  Judge(double tick_rate, double interval) : tick_rate_(tick_rate), interval_(interval) {}
-  /// @param behind  the proxy is inside or behind a body, and the rulers' are not
-  void add(const Tick& tick, const Ruling& ruling, bool behind);
-  [[nodiscard]] const Verdict& verdict() const { return verdict_; }
-
- private:
-  double tick_rate_;
-  double interval_;
-  Verdict verdict_;
-  int behind_for_ = 0;  // ticks in a row, as the others
-  int numb_for_ = 0;
-  int wrong_for_ = 0;
-  double back_for_ = 0.0;  // [s] that being behind has lasted
-  int resting_for_ = 0;
-  Eigen::AlignedBox3d rested_in_;
-  bool touched_ = false;
-  Vec3 last_force_ = Vec3::Zero();
 };
 
 /// What a case came to.

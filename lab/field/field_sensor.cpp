@@ -7,12 +7,10 @@
 #include <cstddef>
 #include <numbers>
 #include <utility>
-#include <vector>
 
 #include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate::lab::field {
-
 namespace {
 
 constexpr unsigned table_bits = 14;
@@ -38,6 +36,14 @@ const std::vector<double>& normal_quantiles() {
   return table;
 }
 
+constexpr double farthest = 4.0;       // [m]
+constexpr double grazing_pair = 0.26;  // [-] cosine below which two eyes find no match: 75 degrees
+constexpr double grazing_flight = 0.12;  // [-] below which too little light comes back: 83 degrees
+constexpr double flying_jump = 0.015;    // [m] between neighbours whose light mixes
+constexpr double flying_share = 0.6;     // [-] of the pixels at such an edge
+constexpr double all_edges = 10.0;       // [px] to both neighbours: a thin thing, not a slope
+constexpr double wiggle_period = 0.375;  // [m] a quarter of half the wave of 100 MHz
+
 }  // namespace
 
 double Chance::normal() { return normal_quantiles()[bits() >> (64U - table_bits)]; }
@@ -51,18 +57,6 @@ void Chance::fill_normal(std::span<double> out) {
     out[i] = table[word & mask];
   }
 }
-
-namespace {
-
-constexpr double farthest = 4.0;       // [m]
-constexpr double grazing_pair = 0.26;  // [-] cosine below which two eyes find no match: 75 degrees
-constexpr double grazing_flight = 0.12;  // [-] below which too little light comes back: 83 degrees
-constexpr double flying_jump = 0.015;    // [m] between neighbours whose light mixes
-constexpr double flying_share = 0.6;     // [-] of the pixels at such an edge
-constexpr double all_edges = 10.0;       // [px] to both neighbours: a thin thing, not a slope
-constexpr double wiggle_period = 0.375;  // [m] a quarter of half the wave of 100 MHz
-
-}  // namespace
 
 const char* to_string(SensorKind kind) {
   constexpr std::array<const char*, sensor_kinds> names = {"stereo", "light", "flight", "coarse",

@@ -3,22 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include <fmt/format.h>
 
 #include "lab/field/field_scene.hpp"
 #include "lab/method.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate::lab::field {
-
-namespace {
-
-constexpr double peak = 1.875;  // [-] of ease(): the fastest over the mean
-
-}  // namespace
 
 Script& Script::wait(double seconds) {
   return follow(seconds, [place = end_](double) { return place; });
@@ -30,7 +22,7 @@ Script& Script::stroke(const std::vector<Vec3>& places, double speed) {
   std::vector<double> gone = {0.0};
   for (std::size_t i = 1; i < places.size(); ++i)
     gone.push_back(gone.back() + (places[i] - places[i - 1]).norm());
-  const double seconds = std::max(peak * gone.back() / speed, 1e-3);
+  const double seconds = std::max(ease_peak * gone.back() / speed, 1e-3);
   return follow(seconds, [=, begin = now_](double t) {
     const double way = gone.back() * ease((t - begin) / seconds);
     std::size_t i = 1;
@@ -96,19 +88,6 @@ double Draw::given(std::string_view key, double drawn, double low, double high) 
   return value.value;
 }
 
-Eigen::Isometry3d at(const Vec3& place) { return Eigen::Isometry3d(Eigen::Translation3d(place)); }
-Eigen::Isometry3d at(double x, double y, double z) { return at(Vec3(x, y, z)); }
-Eigen::Isometry3d turned(double angle, const Vec3& axis) {
-  return Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
-}
-Body still(ShapePtr shape, const Eigen::Isometry3d& place) {
-  return {std::move(shape), place, nullptr};
-}
-Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion) {
-  return {std::move(shape), Eigen::Isometry3d::Identity(), std::move(motion)};
-}
-Vec3 toward(double heading) { return {math::cos(heading), math::sin(heading), 0.0}; }
-
 Place below(const FieldScene& scene, double x, double y, double t, double from) {
   const Snapshot snapshot(scene, t);
   const Vec3 high(x, y, from);
@@ -116,8 +95,6 @@ Place below(const FieldScene& scene, double x, double y, double t, double from) 
   const Vec3 point = high - gone * Vec3::UnitZ();
   return {point, snapshot.nearest(point + 1e-4 * Vec3::UnitZ()).normal};
 }
-
-double seconds_for(double way, double fastest) { return 1.875 * way / fastest; }
 
 void play_script(Setting& setting, const Script& script) {
   setting.duration = script.duration();
@@ -127,27 +104,18 @@ void play_script(Setting& setting, const Script& script) {
 std::function<Eigen::Isometry3d(double)> turning(const Vec3& axis_at, double angle, double begin,
                                                  double seconds, const Eigen::Isometry3d& on_it) {
   return [=](double t) {
-    return Eigen::Isometry3d(at(axis_at) *
-                             turned(angle * ease((t - begin) / seconds), Vec3::UnitZ()) * on_it);
+    return Eigen::Isometry3d(at(axis_at) * turned(angle * ease((t - begin) / seconds)) * on_it);
   };
 }
 
-namespace {
-
-std::vector<std::pair<ShapePtr, Eigen::Isometry3d>> arm_parts() {
+void add_arm(FieldScene& scene, const std::function<Eigen::Isometry3d(double)>& pose) {
   std::vector<std::pair<ShapePtr, Eigen::Isometry3d>> parts = {
       {capsule(0.16, 0.038), at(-0.38, 0.0, 0.0)},
       {capsule(0.035, 0.027), at(-0.135, 0.015, 0.0)},
       {capsule(0.035, 0.027), at(-0.135, -0.015, 0.0)}};
   for (const double y : {-0.024, -0.008, 0.008, 0.024})  // closed fingers
     parts.emplace_back(capsule(0.045, 0.0085), at(-0.055, y, 0.0));
-  return parts;
-}
-
-}  // namespace
-
-void add_arm(FieldScene& scene, const std::function<Eigen::Isometry3d(double)>& pose) {
-  for (const auto& [shape, place] : arm_parts())
+  for (const auto& [shape, place] : parts)
     scene.push_back(moving(
         shape, [pose, at_rest = place](double t) { return Eigen::Isometry3d(pose(t) * at_rest); }));
 }

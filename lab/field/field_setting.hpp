@@ -8,9 +8,11 @@
 #include <numbers>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "lab/field/field_cases.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/core/patch.hpp"
 #include "palpate/kernel/core/uri.hpp"
 
@@ -47,6 +49,7 @@ class Script {
 // What the sets of cases make their scenes and hands of.
 
 constexpr double pi = std::numbers::pi;
+constexpr double ease_peak = 1.875;  ///< [-] of ease(): the fastest over the mean
 
 std::uint64_t hash_of(std::string_view text, std::uint64_t hash);
 
@@ -82,12 +85,20 @@ class Draw {
   std::map<std::string_view, Value> values_;
 };
 
-Eigen::Isometry3d at(const Vec3& place);
-Eigen::Isometry3d at(double x, double y, double z);
-Eigen::Isometry3d turned(double angle, const Vec3& axis);
-Body still(ShapePtr shape, const Eigen::Isometry3d& place = Eigen::Isometry3d::Identity());
-Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion);
-Vec3 toward(double heading);
+inline Eigen::Isometry3d at(const Vec3& place) {
+  return Eigen::Isometry3d(Eigen::Translation3d(place));
+}
+inline Eigen::Isometry3d at(double x, double y, double z) { return at(Vec3(x, y, z)); }
+inline Eigen::Isometry3d turned(double angle, const Vec3& axis = Vec3::UnitZ()) {
+  return Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
+}
+inline Body still(ShapePtr shape, const Eigen::Isometry3d& place = Eigen::Isometry3d::Identity()) {
+  return {std::move(shape), place, nullptr};
+}
+inline Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion) {
+  return {std::move(shape), Eigen::Isometry3d::Identity(), std::move(motion)};
+}
+inline Vec3 toward(double heading) { return {math::cos(heading), math::sin(heading), 0.0}; }
 
 /// Where the camera may be.
 struct View {
@@ -117,7 +128,7 @@ struct Place {
 Place below(const FieldScene& scene, double x, double y, double t = 0.0, double from = 0.5);
 
 /// [s] of a way [m, rad] with the least jerk, whose highest speed is `fastest`.
-double seconds_for(double way, double fastest);
+inline double seconds_for(double way, double fastest) { return ease_peak * way / fastest; }
 
 void play_script(Setting& setting, const Script& script);
 

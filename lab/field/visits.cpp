@@ -131,7 +131,7 @@ struct Visitor {
   }
   void enter(FieldScene& scene, const ShapePtr& shape, double heading) const {
     constexpr double pitch = 0.8;  // [rad] the elbow is higher than the hand
-    const Eigen::Isometry3d turn = turned(heading, Vec3::UnitZ());
+    const Eigen::Isometry3d turn = turned(heading);
     scene.push_back(moving(shape, along(thing, turn)));
     add_arm(scene, along(arm, turn * turned(pitch, Vec3::UnitY())));
   }
@@ -144,7 +144,6 @@ Vec3 behind(const Vec3& way) { return -0.35 * way + up(0.12); }
 
 // ---- Boxes, sheets and other things. ----
 
-// A box slides against a hand that presses or waits in the air, and pushes it aside.
 void box_against(Draw& draw, Setting& setting, double start) {
   const double tall = draw.even("tall", 0.02, 0.10);
   const Vec3 half(draw.even("deep", 0.02, 0.06), draw.even("wide", 0.03, 0.08), 0.5 * tall);
@@ -162,12 +161,11 @@ void box_against(Draw& draw, Setting& setting, double start) {
       .wait(draw.even("there", 1.2, 2.0));
   if (draw.whole("leaves", 2) == 1)
     path.reach(front(-0.2), draw.by_factor("leaving", 0.1, 0.5)).wait(1.2);
-  setting.scene = {still(ground()), moving(box(half), along(path, turned(heading, Vec3::UnitZ())))};
+  setting.scene = {still(ground()), moving(box(half), along(path, turned(heading)))};
   setting.view = {.azimuth = heading, .azimuth_range = 1.2, .least_tilt = 0.4};  // of its front
   play(draw, setting, hand.until(path.duration()));
 }
 
-// A sheet of card or board with a round edge is pushed in under a resting hand, and drawn out.
 void sheet_under(Draw& draw, Setting& setting, double start) {
   const double thick = draw.even("thick", 0.001, 0.003);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
@@ -177,15 +175,14 @@ void sheet_under(Draw& draw, Setting& setting, double start) {
   path.wait(hand.now()).reach(front(0.05), pushing(draw)).wait(1.3);
   if (draw.whole("leaves", 2) == 1) path.reach(front(-0.12), 0.3).wait(1.2);
   constexpr double half = 0.08;
-  const Eigen::Isometry3d turn = turned(heading, Vec3::UnitZ());
+  const Eigen::Isometry3d turn = turned(heading);
   setting.scene = {
       still(ground()),
       moving(box(Vec3(half, half, 0.5 * thick)), along(path, turn * at(-half, 0.0, 0.0))),
-      moving(capsule(half, 0.5 * thick), along(path, turn * turned(0.5 * pi, Vec3::UnitZ())))};
+      moving(capsule(half, 0.5 * thick), along(path, turn * turned(0.5 * pi)))};
   play(draw, setting, hand.until(path.duration()));
 }
 
-// A box slides in close under a waiting hand, which presses on it; then it may be drawn away.
 void box_under(Draw& draw, Setting& setting, double start) {
   const double tall = draw.even("tall", 0.015, 0.08);
   const Vec3 half(draw.even("deep", 0.03, 0.06), draw.even("wide", 0.03, 0.06), 0.5 * tall);
@@ -201,13 +198,10 @@ void box_under(Draw& draw, Setting& setting, double start) {
     path.wait(hand.now() - path.duration()).reach(middle + away, draw.by_factor("pull", 0.1, 0.8));
     hand.until(path.duration() + 0.8);
   }
-  setting.scene = {still(ground(), at(up(-tall))),
-                   moving(box(half), along(path, turned(heading, Vec3::UnitZ())))};
+  setting.scene = {still(ground(), at(up(-tall))), moving(box(half), along(path, turned(heading)))};
   play(draw, setting, hand);
 }
 
-// An arm puts a thing down under a waiting hand, which presses on it; it is taken away again, and
-// the hand presses on the table.
 void put_under(Draw& draw, Setting& setting, double start) {
   const double tall = draw.even("tall", 0.03, 0.07);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
@@ -228,7 +222,6 @@ void put_under(Draw& draw, Setting& setting, double start) {
   play(draw, setting, hand);
 }
 
-// An arm puts a thing down beside a resting hand, and may take it away.
 void put_beside(Draw& draw, Setting& setting, double start) {
   const double tall = draw.even("tall", 0.02, 0.08);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
@@ -249,8 +242,6 @@ void put_beside(Draw& draw, Setting& setting, double start) {
   play(draw, setting, hand.until(visitor.now() + 1.1));
 }
 
-// The thing on which a hand rests is pulled away sideways: the hand is left in the air, or on the
-// table.
 void taken_away(Draw& draw, Setting& setting, double start) {
   const double tall = draw.by_factor("tall", 0.004, 0.04);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
@@ -271,7 +262,6 @@ void taken_away(Draw& draw, Setting& setting, double start) {
 
 constexpr double disc_half = 0.01;  // [m]
 
-// Flat domes pass under a hand that rests on a turntable, and tall things beside it.
 void turntable_things(Draw& draw, Setting& setting, double start) {
   const double out = draw.even("out", 0.05, 0.09);
   const double angle =
@@ -284,8 +274,7 @@ void turntable_things(Draw& draw, Setting& setting, double start) {
   Chance chance(draw.seed_of("things"));
   const auto put = [&](ShapePtr shape, double about, const Vec3& place) {
     setting.scene.push_back(moving(
-        std::move(shape),
-        turning(axis, angle, hand.now(), seconds, turned(about, Vec3::UnitZ()) * at(place))));
+        std::move(shape), turning(axis, angle, hand.now(), seconds, turned(about) * at(place))));
   };
   const int domes = 3 + draw.whole("domes", 3);
   for (int i = 0; i < domes; ++i) {
@@ -303,11 +292,10 @@ void turntable_things(Draw& draw, Setting& setting, double start) {
   play(draw, setting, hand.until(hand.now() + seconds + 1.2));
 }
 
-// A hand rests on a turntable that is not level.
 void turntable_wobble(Draw& draw, Setting& setting, double start) {
   const double out = draw.even("out", 0.04, 0.10);
   const double seconds = draw.even("turning", 2.0, 4.0);
-  const Eigen::Isometry3d disc = turned(draw.even("about", 0.0, 2.0 * pi), Vec3::UnitZ()) *
+  const Eigen::Isometry3d disc = turned(draw.even("about", 0.0, 2.0 * pi)) *
                                  turned(draw.even("askew", 0.03, 0.10), Vec3::UnitY()) *
                                  at(up(-disc_half));
   const Vec3 axis(-out, 0.0, 0.0);
@@ -355,7 +343,6 @@ FieldScene pile_of(Draw& draw) {
 
 constexpr double pile_feature = 0.012;  // [m] its thinnest rods
 
-// A hand feels over a pile and stays at the end.
 void pile_feel(Draw& draw, Setting& setting, double start) {
   setting.scene = pile_of(draw);
   setting.feature = pile_feature;
@@ -374,7 +361,6 @@ void pile_feel(Draw& draw, Setting& setting, double start) {
   play(draw, setting, hand.rest(1.2));
 }
 
-// Something falls on a pile beside the hand that rests on it; then the hand presses there.
 void pile_add(Draw& draw, Setting& setting, double start) {
   setting.scene = pile_of(draw);
   setting.feature = pile_feature;
@@ -422,11 +408,10 @@ Door door_of(Draw& draw, Setting& setting) {
   setting.view = {facing, 0.6, std::max(lean - 0.3, 0.0)};
   setting.most_tilt = std::min(lean + 0.4, 1.2);
   setting.scene = {still(ground(), at(up(-0.3)))};
-  return {turned(facing, Vec3::UnitZ()) * turned(lean, Vec3::UnitY()), draw.even("arm", 0.06, 0.14),
+  return {turned(facing) * turned(lean, Vec3::UnitY()), draw.even("arm", 0.06, 0.14),
           draw.even("thick", 0.006, 0.03)};
 }
 
-// A hand presses on a door and goes with it as it opens and closes.
 void door_ride(Draw& draw, Setting& setting, double start) {
   const Door door = door_of(draw, setting);
   const double turn = pushing(draw) / door.arm;
@@ -444,8 +429,6 @@ void door_ride(Draw& draw, Setting& setting, double start) {
   play(draw, setting, hand);
 }
 
-// A door opens away from a hand that pressed on it, comes back, pushes the hand and goes to where
-// it was.
 void door_push(Draw& draw, Setting& setting, double start) {
   const Door door = door_of(draw, setting);
   const double turn = pushing(draw) / door.arm;
@@ -483,7 +466,6 @@ std::vector<Wave> waves_of(Draw& draw, double begin, double end) {
   return waves;
 }
 
-// Waves begin, go on and ebb away under a hand that rests on a cloth.
 void cloth_ripples(Draw& draw, Setting& setting, double start) {
   Hand hand = hand_over(draw, start).press(up(0.0)).rest(0.7);
   const double end = hand.now() + draw.even("rippling", 1.5, 3.0);
@@ -491,7 +473,6 @@ void cloth_ripples(Draw& draw, Setting& setting, double start) {
   play(draw, setting, hand.until(end + swell + 1.2));
 }
 
-// A hand strokes to and fro over a cloth that ripples all the time, and rests.
 void cloth_stroke(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(cloth(waves_of(draw, Wave{}.begin, Wave{}.end)))};
   const Vec3 half = draw.even("stroke", 0.02, 0.05) * toward(draw.even("heading", 0.0, 2.0 * pi));
@@ -513,7 +494,6 @@ void work_until(Draw& draw, Setting& setting, Hand hand, double t, double rest) 
   play(draw, setting, hand.until(t).rest(rest));
 }
 
-// An arm comes between the camera and a hand, stops there and leaves, once or twice.
 void arm_visits(Draw& draw, Setting& setting, double start) {
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const double speed = carrying(draw);
@@ -530,14 +510,12 @@ void arm_visits(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(ground())};
   setting.before_camera = [=](FieldScene& scene, const Vec3& eye) {
     const Vec3 between = over / eye.z() * eye;
-    add_arm(scene, [=](double t) {
-      return Eigen::Isometry3d(at(between + arm.at(t)) * turned(heading, Vec3::UnitZ()));
-    });
+    add_arm(scene,
+            [=](double t) { return Eigen::Isometry3d(at(between + arm.at(t)) * turned(heading)); });
   };
   work_until(draw, setting, hand, arm.duration(), 1.2 + visits * there);
 }
 
-// A person passes between the camera and a hand, and may stop on the way.
 void person_passes(Draw& draw, Setting& setting, double start) {
   const double speed = draw.by_factor("walk", 0.5, 1.5);
   const double stop = draw.whole("stops", 2) == 1 ? draw.even("stop", 0.1, 1.0) : 0.0;
@@ -558,7 +536,7 @@ void person_passes(Draw& draw, Setting& setting, double start) {
     view.linear().col(0) = eye.cross(Vec3::UnitX()).normalized();
     view.linear().col(1) = view.linear().col(2).cross(view.linear().col(0));
     scene.push_back(moving(capsule(0.25, radius), [=](double t) {
-      return Eigen::Isometry3d(view * at(path.at(t)) * turned(0.5 * pi, Vec3::UnitZ()));
+      return Eigen::Isometry3d(view * at(path.at(t)) * turned(0.5 * pi));
     }));
   };
   work_until(draw, setting, hand, path.duration(), 1.2 + stop);
@@ -581,14 +559,12 @@ Vec3 corner_of(Draw& draw, Setting& setting, int walls) {
   return normals;
 }
 
-// A hand rests in a concave corner.
 void corner_rest(Draw& draw, Setting& setting, double start) {
   const Vec3 normals = corner_of(draw, setting, 1 + draw.whole("walls", 2));
   Hand hand = hand_over(draw, start, up(0.0), normals.normalized());
   play(draw, setting, hand.press(up(0.0)).rest(2.0));
 }
 
-// A hand slides along a concave edge and rests in it, at the second wall or before it.
 void corner_along(Draw& draw, Setting& setting, double start) {
   const Vec3 normals = corner_of(draw, setting, 2);
   const Vec3 edge(0.0, draw.even("along", 0.03, 0.08), 0.0);

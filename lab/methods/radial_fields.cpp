@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // [13], first form: every point is a ball that fades outwards, and where the balls add up to T is
-// an implicit surface, touched by ImplicitProxy:
+// an implicit surface, touched by ImplicitMethod:
 //
 //   phi = T - sum f(r),  f(r) = (1 - r/R)^4 (4 r/R + 1),
 //   R = 2.5 times the mean distance from the point to its three nearest neighbours
@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lab/implicit_proxy.hpp"
+#include "lab/implicit_method.hpp"
 #include "lab/local_points.hpp"
 
 namespace palpate::lab {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // [13], second form: every point gets a normal n_i by total least squares over its 9 nearest
 // neighbours [16], towards the camera, and these surfels blend to an implicit surface, touched by
-// ImplicitProxy:
+// ImplicitMethod:
 //
 //   phi(p) = n . (p - a),  a = sum w x_i / sum w,  n = sum w n_i, normalised
 //
@@ -14,7 +14,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "lab/implicit_proxy.hpp"
+#include "lab/implicit_method.hpp"
 #include "lab/local_points.hpp"
 
 namespace palpate::lab {

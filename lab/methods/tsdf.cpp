@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A truncated signed distance function about the proxy, what one would try today: 64^3 voxels of
-// 1.5 mm into which every frame is fused, touched by ImplicitProxy.
+// 1.5 mm into which every frame is fused, touched by ImplicitMethod.
 //
 // Each point within it writes its signed distance along its line of sight into the voxels there,
 // from the near side of the volume (free: +truncation) to one truncation (4 voxels) behind it. A
@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "lab/implicit_proxy.hpp"
+#include "lab/implicit_method.hpp"
 #include "lab/local_points.hpp"
 
 namespace palpate::lab {
@@ -83,7 +83,6 @@ class Tsdf final : public ImplicitMethod {
 
   // @param all  also into voxels that are known; else only into those that came in by a move
   void fuse(bool all) {
-    // The ball about the cube.
     gather(*cloud_, Ball{centre(), 1.7320508 * half}, patch_);
     if (patch_.size() == 0) return;
     const auto& viewpoint = patch_.view(0).viewpoint;

@@ -147,16 +147,18 @@ def _zwidth(rows, panels):
     axes.axvline(1500.0, color="grey", linestyle="--")
 
 
-def _cases(rows, panels, group, *columns, **labels):
-    """A panel a column, of the first row of each group and method."""
-    for axes, column in zip(panels(len(columns), 2), columns):
-        _groups(axes, rows, group, lambda own, column=column: float(own[0][column] or "nan"),
-                xlabel=column, **labels)
+def _cases(group, *columns, **labels):
+    """A figure with a panel a column, of the first row of each group and method."""
+    def figure(rows, panels):
+        for axes, column in zip(panels(len(columns), 2), columns):
+            _groups(axes, rows, group, lambda own, column=column: float(own[0][column] or "nan"),
+                    xlabel=column, **labels)
+    return figure
 
 
-def _tool(rows, panels):
-    _cases(rows, panels, lambda row: f"{row['case']} {row['camera']}", "force_error",
-           "torque_error", xscale="log", xlim=(1e-4, 10))
+_tool = _cases(lambda row: f"{row['case']} {row['camera']}", "force_error", "torque_error",
+               xscale="log", xlim=(1e-4, 10))
+_splat = _cases(lambda row: f"{row['body']} {row['splat']}", "held", "error")
 
 
 def _tool_cases(rows, panels):
@@ -181,10 +183,6 @@ def _turning(rows, panels):
     _groups(stiffest, [dict(row, method="stiffest at rest") for row in rows], tool,
             lambda own: float(own[0]["stiffest"]), xscale="log",
             xlabel="stiffness in rotation [N m/rad]")
-
-
-def _splat(rows, panels):
-    _cases(rows, panels, lambda row: f"{row['body']} {row['splat']}", "held", "error")
 
 
 def _materials(rows, panels):

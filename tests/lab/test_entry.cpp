@@ -224,7 +224,7 @@ while True:
 
 Vec3 asked(Method& method, const Vec3& hip = Vec3(1, 2, 3), double t = 0.5) {
   const Tick tick = method.tick(hip, t);
-  dynamic_cast<const FallibleMethod&>(method).rethrow();
+  dynamic_cast<const LabMethod&>(method).rethrow();
   return tick.force;
 }
 

@@ -67,8 +67,9 @@ double figure_of(const FeelFigures& figures, std::string_view loop, std::string_
   return -1.0;
 }
 
-FeelOptions once() {
+FeelOptions once(std::vector<OwnMethod> contestants) {
   FeelOptions options;
+  options.contestants = std::move(contestants);
   options.repeats = options.phases = 1;
   return options;
 }
@@ -154,7 +155,7 @@ TEST(Feel, MeasuresARippleAndNothingOfAnExactPlane) {
   const auto ripple = [](Tick& tick) {
     tick.force.z() += 0.020 * std::sin(2.0 * std::numbers::pi * 100.0 * tick.t);
   };
-  const FeelFigures figures = play_rest({plane_with(), plane_with(ripple, "ripple")}, once(), 0.95);
+  const FeelFigures figures = play_rest(once({plane_with(), plane_with(ripple, "ripple")}), 0.95);
   EXPECT_LT(figure_of(figures, "path", "felt"), 1e-6);
   EXPECT_LT(figure_of(figures, "light", "felt"), 5.0) << "a count of the device's resolution";
   EXPECT_NEAR(figure_of(figures, "path", "felt", "ripple"), 20.0 / std::numbers::sqrt2, 0.1);
@@ -166,7 +167,7 @@ TEST(Feel, MeasuresStepAndErrorOfASlide) {
   const auto fault = [](Tick& tick) {
     if (tick.t > 2.0) tick.force *= 1.1;
   };
-  const FeelFigures figures = play_slide({plane_with(fault)}, once(), 0.95);
+  const FeelFigures figures = play_slide(once({plane_with(fault)}), 0.95);
   EXPECT_NEAR(figure_of(figures, "path", "step"), 0.48, 1e-6);
   EXPECT_NEAR(figure_of(figures, "path", "error"), 10.0, 1e-6);
   EXPECT_NEAR(figure_of(figures, "light", "step"), 0.1 * 0.686, 0.03);
@@ -178,7 +179,7 @@ TEST(Feel, MeasuresOvershootAndSwingOfAnOnset) {
     tick.surface_velocity = tick.t > 1.7 ? 0.1 : 0.0;
     if (tick.t > 1.8 && tick.t < 1.81) tick.force.z() -= 0.5;
   };
-  const FeelFigures figures = play_onset({plane_with(), plane_with(fault, "faulty")}, once());
+  const FeelFigures figures = play_onset(once({plane_with(), plane_with(fault, "faulty")}));
   EXPECT_NEAR(figure_of(figures, "path", "overshoot", "faulty"), 2.0, 1e-9);
   // The true force rises by 0.03 N a tick in between.
   EXPECT_NEAR(figure_of(figures, "path", "swing", "faulty"), 0.5, 0.031);
@@ -194,8 +195,8 @@ TEST(Feel, MeasuresTheKickOfAForceThatComesBack) {
     };
   };
   const FeelFigures figures = play_return(
-      {plane_with(), plane_with(back_over(1e-3), "slam"), plane_with(back_over(5.0), "slow")},
-      once(), Unseen::stopped);
+      once({plane_with(), plane_with(back_over(1e-3), "slam"), plane_with(back_over(5.0), "slow")}),
+      Unseen::stopped);
   EXPECT_GT(figure_of(figures, "light", "kick", "slam"), 200.0);
   EXPECT_LT(figure_of(figures, "light", "kick", "slow"), 20.0);
   EXPECT_GT(figure_of(figures, "free", "kick", "slam"),
@@ -215,14 +216,14 @@ TEST(Feel, MeasuresFrictionThatIsWrongAndHandsThatCreep) {
     if (tick.force.z() > 0.0) tick.force.x() = -0.5 * 1.5 * tick.force.z();
   };
   const OwnMethod right = rough(plane_with());
-  const FeelFigures rubs = play_rub({right, plane_with(half_too_much)}, once());
+  const FeelFigures rubs = play_rub(once({right, plane_with(half_too_much)}));
   EXPECT_LT(figure_of(rubs, "path", "ratio", "plane-rough"), 1.0);
   EXPECT_GT(figure_of(rubs, "path", "ratio", "plane"), 50.0);
   const auto creeping = [](Tick& tick) {
     const double anchor = 1.5e-3 + 50e-6 * tick.t;
     if (tick.force.z() > 0.0) tick.force.x() = 600.0 * (anchor - tick.hip.x());
   };
-  const FeelFigures sticks = play_stick({right, plane_with(creeping)}, once(), 0.0);
+  const FeelFigures sticks = play_stick(once({right, plane_with(creeping)}), 0.0);
   EXPECT_LT(figure_of(sticks, "light", "drift", "plane-rough"), 0.01);
   EXPECT_NEAR(figure_of(sticks, "light", "drift"), 0.5 * 600.0 / 700.0, 0.02);
 }
@@ -241,7 +242,7 @@ TEST(Feel, CountsTheEnergyThatAMethodGivesBeyondAnExactSurface) {
                               if (last->out && !tick.force.isZero()) tick.force.z() += 0.6;
                             });
                           }};
-  const FeelFigures figures = play_energy({plane_with(), pushing}, once(), 0.7, "d4xx");
+  const FeelFigures figures = play_energy(once({plane_with(), pushing}), 0.7, "d4xx");
   const auto figure = [&](std::string_view method, std::string_view loop,
                           std::string_view measure) {
     return figure_of(figures, loop, measure, method);

@@ -2,7 +2,6 @@
 #include "palpate/drivers/dds.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -192,59 +191,7 @@ std::optional<std::string> client_of(const Library& library, Endpoint* endpoint)
   return client;
 }
 
-// @param size  1, 2, 4 or 8, whose codes follow one another
-std::uint32_t code_of(std::size_t size) {
-  return cyclone::of_1_byte + static_cast<std::uint32_t>(std::countr_zero(size));
-}
-
 }  // namespace
-
-std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) {
-  using Kind = ros::CField::Kind;
-  std::vector<std::uint32_t> code;
-  // Elements that are structs have their instructions behind, to which their sequence points.
-  std::vector<std::pair<std::size_t, const std::vector<ros::CField>*>> waiting{{0, &fields}};
-  for (std::size_t i = 0; i < waiting.size(); ++i) {
-    const auto [from, struct_fields] = waiting[i];
-    if (i > 0) code[from + 3] |= static_cast<std::uint32_t>(code.size() - from);
-    for (const ros::CField& field : *struct_fields) {
-      const std::size_t begin = code.size();
-      const auto put = [&](std::uint32_t type, std::uint32_t element) {
-        code.push_back(cyclone::op_field | type << 16 | element << 8);
-        code.push_back(static_cast<std::uint32_t>(field.offset));
-      };
-      switch (field.kind) {
-        case Kind::number:
-          put(code_of(field.size), 0);
-          break;
-        case Kind::flag:
-          put(cyclone::of_flag, 0);
-          break;
-        case Kind::text:
-          put(cyclone::of_text, 0);
-          break;
-        case Kind::numbers:
-          put(cyclone::of_sequence, code_of(field.size));
-          break;
-        case Kind::texts:
-          put(cyclone::of_sequence, cyclone::of_text);
-          break;
-        case Kind::array:
-          put(cyclone::of_array, code_of(field.size));
-          code.push_back(static_cast<std::uint32_t>(field.count));
-          break;
-        case Kind::structs:
-          put(cyclone::of_sequence, cyclone::of_struct);
-          code.push_back(static_cast<std::uint32_t>(field.size));
-          code.push_back(4U << 16);
-          waiting.emplace_back(begin, &field.fields);
-          break;
-      }
-    }
-    code.push_back(cyclone::op_return);
-  }
-  return code;
-}
 
 ros::Time stamp_of(double monotonic) { return ros::Time::at(since_1970(monotonic)); }
 
@@ -340,9 +287,8 @@ void Participant::wait(double seconds) {
   library_->wait(waitset_, nullptr, 0, duration(std::max(seconds, 0.0)));
 }
 
-int Participant::topic(const std::string& name, std::string_view type,
-                       const ros::CSample& example) {
-  const std::vector<std::uint32_t> code = instructions(example.fields());
+int Participant::topic(const std::string& name, std::string_view type, const CSample& example) {
+  const std::vector<std::uint32_t>& code = example.instructions();
   const std::string type_name = dds_type(type);
   const TopicDescriptor descriptor{.size = static_cast<std::uint32_t>(example.size()),
                                    .align = 8,
@@ -363,20 +309,24 @@ int Participant::topic(const std::string& name, std::string_view type,
   return topic;
 }
 
-Reader::Reader(Participant& participant, const std::string& topic, std::string_view type,
-               const ros::CSample& example, const Quality& quality)
+TopicEnd::TopicEnd(Participant& participant, const std::string& topic, std::string_view type,
+                   const CSample& example, const Quality& quality, bool reads)
     : participant_(participant), topic_(topic) {
   const Library& library = *participant.library_;
   const Offer offer(library, quality);
   const int of_dds = participant.topic(topic, type, example);
-  entity_ = library.create_reader(participant.entity_, of_dds, offer.get(), nullptr);
-  library.remove(of_dds);  // it lives as long as its reader
-  participant.check(entity_, "it cannot read " + topic);
+  const auto create = reads ? library.create_reader : library.create_writer;
+  entity_ = create(participant.entity_, of_dds, offer.get(), nullptr);
+  library.remove(of_dds);  // it lives as long as what reads or writes it
+  participant.check(entity_, (reads ? "it cannot read " : "it cannot write ") + topic);
+  if (!reads) return;
   library.set_status_mask(entity_, cyclone::data_available);
   library.attach(participant.waitset_, entity_, 0);
 }
 
-Reader::~Reader() { participant_.library_->remove(entity_); }
+TopicEnd::~TopicEnd() { participant_.library_->remove(entity_); }
+
+Guid TopicEnd::guid() const { return guid_of(*participant_.library_, entity_); }
 
 bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
   const Library& library = *participant_.library_;
@@ -408,20 +358,7 @@ int Reader::writers() const {
   return std::max(participant_.library_->matched_writers(entity_, nullptr, 0), 0);
 }
 
-Writer::Writer(Participant& participant, const std::string& topic, std::string_view type,
-               const ros::CSample& example, const Quality& quality)
-    : participant_(participant) {
-  const Library& library = *participant.library_;
-  const Offer offer(library, quality);
-  const int of_dds = participant.topic(topic, type, example);
-  entity_ = library.create_writer(participant.entity_, of_dds, offer.get(), nullptr);
-  library.remove(of_dds);  // it lives as long as its writer
-  participant.check(entity_, "it cannot write " + topic);
-}
-
-Writer::~Writer() { participant_.library_->remove(entity_); }
-
-bool Writer::write_sample(const ros::CSample& sample) {
+bool Writer::write_sample(const CSample& sample) {
   return participant_.library_->write(entity_, sample.data()) >= 0;
 }
 
@@ -432,10 +369,6 @@ bool Writer::wait_for_readers(double seconds) {
 int Writer::readers() const {
   return std::max(participant_.library_->matched_readers(entity_, nullptr, 0), 0);
 }
-
-Guid Reader::guid() const { return guid_of(*participant_.library_, entity_); }
-
-Guid Writer::guid() const { return guid_of(*participant_.library_, entity_); }
 
 Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies) {
   const Library& library = *replies.participant_.library_;

@@ -17,7 +17,7 @@
 
 // The messages of ROS 2's standard packages that a recording is made of; fields in the order and
 // under the names of their definitions, units as ROS has them (REP 103). Each hands its fields, in
-// that order, to whatever writes them, reads them, or lays them out in memory (c_sample.hpp).
+// that order, to whatever writes them, reads them, or lays them out in memory.
 namespace palpate::ros {
 
 /// The name of a type, as an argument of a template.

@@ -174,8 +174,8 @@ class McapFile final : public ChunkedBag {
     return {logged, record, offset, channel};
   }
 
-  // The records of the chunk that begins there, decompressed and checked; they live until those of
-  // another chunk are asked for.
+  // The records of the chunk there, decompressed and checked; they live until the next is asked
+  // for.
   std::span<const std::byte> chunk_at(std::uint64_t place) {
     if (chunk_place_ == place) return chunk_;
     chunk_place_ = 0;

@@ -219,8 +219,7 @@ class Ros1File final : public ChunkedBag {
                      ", which is not declared in the file");
   }
 
-  // The records of the chunk that begins there, decompressed; they live until those of another
-  // chunk are asked for.
+  // The records of the chunk that begins there, decompressed, until the next is asked for.
   std::span<const std::byte> chunk_at(std::uint64_t place) {
     if (chunk_place_ == place) return chunk_;
     chunk_place_ = 0;

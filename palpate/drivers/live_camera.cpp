@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -29,8 +30,8 @@ std::vector<std::uint16_t> depth_rows(const void* data, int width, int height, s
   const std::size_t row = sizeof(std::uint16_t) * static_cast<std::size_t>(std::max(width, 0));
   if (data == nullptr || width < 1 || height < 1 || stride < row)
     throw Error(camera,
-                "it gives images of " + std::to_string(width) + "x" + std::to_string(height) +
-                    " pixels in rows of " + std::to_string(stride) + " bytes",
+                "it gives images of " + size_text(width, height) + " pixels in rows of " +
+                    std::to_string(stride) + " bytes",
                 "its library or firmware may be of another version");
   std::vector<std::uint16_t> depth(static_cast<std::size_t>(width) *
                                    static_cast<std::size_t>(height));

@@ -82,10 +82,10 @@ Eigen::Isometry3d looking_at_origin(double distance, double tilt, double azimuth
 
 SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const SensorModel& sensor,
                                  SourceInfo info)
-    : scene_(std::move(scene)),
+    : NumberedSource(std::move(info)),
+      scene_(std::move(scene)),
       setup_(setup),
       sensor_(sensor, setup.intrinsics),
-      info_(std::move(info)),
       rays_(std::make_shared<const ViewingRays>(setup.intrinsics)),
       directions_(setup.intrinsics.width),
       along_(setup.intrinsics.width) {
@@ -97,16 +97,9 @@ SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const Se
 }
 
 std::optional<Frame> SyntheticCamera::next(double /*timeout*/) {
-  if (setup_.frames && next_frame_ >= *setup_.frames) return std::nullopt;
-  const std::uint64_t frame = next_frame_++;
+  if (setup_.frames && next_ >= *setup_.frames) return std::nullopt;
+  const std::uint64_t frame = next_++;
   return capture(static_cast<double>(frame) / setup_.frame_rate, frame);
-}
-
-std::size_t SyntheticCamera::skip(std::size_t count) {
-  const std::uint64_t left = setup_.frames ? *setup_.frames - next_frame_ : count;
-  const std::uint64_t skipped = std::min<std::uint64_t>(count, left);
-  next_frame_ += skipped;
-  return skipped;
 }
 
 Frame SyntheticCamera::capture(double t, std::uint64_t frame) {

@@ -17,10 +17,9 @@
 
 namespace palpate::dds {
 
-/// A message as a C struct, and the instructions by which Cyclone DDS writes and reads such
-/// structs. Fields lie one after another, each at a multiple of its size; structs within are
-/// dissolved into theirs. Long sequences of numbers are not copied: they point into the message,
-/// which must outlive this.
+/// A message as a C struct, and the instructions by which Cyclone DDS writes and reads it. Fields
+/// lie one after another, each at a multiple of its size; structs within are dissolved into theirs.
+/// Sequences of numbers are not copied: they point into the message, which must outlive this.
 class CSample {
  public:
   template <Walkable Message>

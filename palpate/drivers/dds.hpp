@@ -19,9 +19,8 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-// ROS 2's topics without ROS: by Eclipse Cyclone DDS's library, which is loaded when it is asked
-// for. Topics and types have the names that ROS gives them: /camera/depth/image_raw,
-// sensor_msgs/msg/Image.
+// ROS 2's topics without ROS, by Eclipse Cyclone DDS's library. Topics and types have the names
+// that ROS gives them: /camera/depth/image_raw, sensor_msgs/msg/Image.
 namespace palpate::dds {
 
 /// What a reader asks for, or a writer offers. A best-effort reader takes from every writer, and
@@ -48,7 +47,7 @@ enum class Generation : std::uint8_t {
 /// What somebody publishes.
 struct Publication {
   std::string topic, type;
-  friend bool operator==(const Publication&, const Publication&) = default;
+  friend auto operator<=>(const Publication&, const Publication&) = default;
 };
 
 struct Library;
@@ -208,8 +207,7 @@ inline std::string service_identity(const Guid& participant, unsigned number) {
 }
 
 /// A service of a node, asked and answered as rmw_cyclonedds_cpp does: each message begins with who
-/// asked and the number of the request. (rmw_fastrtps_cpp says that outside of the message, where
-/// Cyclone's C API cannot write.)
+/// asked and its number. (rmw_fastrtps_cpp says that where Cyclone's C API cannot write.)
 template <class Type>
 class Service {
  public:

@@ -226,19 +226,8 @@ struct KeyValue {
   static void walk(auto& way, auto& m) { way(m.key, m.value); }
 };
 
-struct Point {
-  static constexpr std::string_view type = "geometry_msgs/msg/Point";
-  std::array<double, 3> xyz{};
-
-  static void walk(auto& way, auto& m) { way(m.xyz); }
-};
-
-struct Vector3 {
-  static constexpr std::string_view type = "geometry_msgs/msg/Vector3";
-  std::array<double, 3> xyz{};
-
-  static void walk(auto& way, auto& m) { way(m.xyz); }
-};
+using Point = Single<"geometry_msgs/msg/Point", std::array<double, 3>>;
+using Vector3 = Single<"geometry_msgs/msg/Vector3", std::array<double, 3>>;
 
 struct Wrench {
   static constexpr std::string_view type = "geometry_msgs/msg/Wrench";

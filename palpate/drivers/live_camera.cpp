@@ -37,10 +37,6 @@ std::vector<std::uint16_t> depth_rows(const void* data, int width, int height, s
                                    static_cast<std::size_t>(height));
   const auto* from = static_cast<const std::byte*>(data);
   auto* to = reinterpret_cast<std::byte*>(depth.data());
-  if (stride == row) {
-    std::memcpy(to, from, row * static_cast<std::size_t>(height));
-    return depth;
-  }
   for (int v = 0; v < height; ++v, from += stride, to += row) std::memcpy(to, from, row);
   return depth;
 }

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <optional>
 #include <string>
@@ -23,6 +22,7 @@
 #include "palpate/kernel/cloud/organised.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -296,14 +296,10 @@ class Camera final : public LiveCamera {
       return;
     }
     info_.clock = StampClock::monotonic;
-    clock_note_ = "; its machine's clock is known within " +
-                  milliseconds(clock_->relation().uncertainty(monotonic_now())) +
-                  " ms by questions and answers";
-  }
-  static std::string milliseconds(double seconds) {
-    std::array<char, 32> text{};
-    const int length = std::snprintf(text.data(), text.size(), "%.2f", 1e3 * seconds);
-    return {text.data(), static_cast<std::size_t>(length)};
+    clock_note_ =
+        "; its machine's clock is known within " +
+        number_text(std::ceil(1e5 * clock_->relation().uncertainty(monotonic_now())) / 100.0) +
+        " ms by questions and answers";
   }
   template <class Which>
   bool hears(const Which& which) {

@@ -208,8 +208,6 @@ double median_rate(const std::vector<RecordedImage>& images) {
   return 1.0 / *middle;
 }
 
-bool is_json(const fs::path& path) { return path.extension() == ".json"; }
-
 }  // namespace
 
 std::unique_ptr<Source> open_tum(const Uri& uri) {
@@ -331,7 +329,7 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   }
   const std::string poses = uri.text_option("poses", "none");
   const fs::path poses_file = (is_folder ? path : folder) / poses;
-  const bool matrices = poses != "none" && is_json(poses_file);
+  const bool matrices = poses != "none" && poses_file.extension() == ".json";
   if (matrices) {
     const auto world_from_camera =
         parse_pose_matrices(read_text(poses_file, largest_text), poses_file.string());

@@ -72,12 +72,10 @@ class PointFileSource final : public NumberedSource {
       if (image) return Frame{stamp, std::move(image), std::move(colour)};
     }
     Surface surface{.points = std::move(file.points),
+                    .columns = is_image ? columns : 0,
+                    .rows = is_image ? rows : 0,
                     .normals = std::move(file.normals),
                     .triangles = std::move(file.triangles)};
-    if (is_image) {
-      surface.columns = columns;
-      surface.rows = rows;
-    }
     return Frame{stamp, std::make_shared<PointCloud>(std::move(surface), file.viewpoint),
                  std::move(colour)};
   }

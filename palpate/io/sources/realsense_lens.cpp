@@ -40,15 +40,9 @@ RealSenseLens parse_realsense_lens(std::string_view text, const std::string& nam
   k.fx = number("fx");
   k.fy = number("fy");
   lens.model = wanted("model");
-  std::string_view coeffs = wanted("coeffs");
-  for (double& coeff : lens.coeffs) {
-    const std::string_view each = coeffs.substr(0, coeffs.find(','));
-    const auto value = detail::to_number(each);
-    if (!value || !std::isfinite(*value))
-      throw Error(name, "its coeffs are not five numbers", "it may be damaged");
-    coeff = *value;
-    coeffs.remove_prefix(std::min(coeffs.size(), each.size() + 1));
-  }
+  const auto coeffs = detail::to_numbers(std::string(wanted("coeffs")), lens.coeffs.size());
+  if (coeffs.empty()) throw Error(name, "its coeffs are not five numbers", "it may be damaged");
+  std::copy(coeffs.begin(), coeffs.end(), lens.coeffs.begin());
   return lens;
 }
 

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/io/sources/point_file_source.hpp"
+#include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"

@@ -130,17 +130,6 @@ Image decode(Bytes bytes, const std::string& name, const char* needed) {
   return image;
 }
 
-template <class To, class Pixel>
-To decoded(const std::filesystem::path& path, const Pixel& pixel) {
-  const std::vector<std::byte> bytes = read_file(path, largest_file);
-  const Image image = decode(bytes, path.string(), "a PNG is needed");
-  To to;
-  to.width = static_cast<int>(image.width);
-  to.height = static_cast<int>(image.height);
-  for (std::size_t i = 0; i < std::size_t{image.width} * image.height; ++i) pixel(image, i, to);
-  return to;
-}
-
 }  // namespace
 
 DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name) {
@@ -163,24 +152,24 @@ DepthPng read_depth_png(const std::filesystem::path& path) {
   return parse_depth_png(read_file(path, largest_file), path.string());
 }
 
-GreyPng read_grey_png(const std::filesystem::path& path) {
-  return decoded<GreyPng>(path, [](const Image& image, std::size_t i, GreyPng& to) {
-    const bool is_grey = image.channels < 3;
+LightPng read_light_png(const std::filesystem::path& path, bool in_colour) {
+  const std::vector<std::byte> bytes = read_file(path, largest_file);
+  const Image image = decode(bytes, path.string(), "a PNG is needed");
+  LightPng light{static_cast<int>(image.width), static_cast<int>(image.height), {}};
+  const bool is_grey = image.channels < 3;
+  for (std::size_t i = 0; i < std::size_t{image.width} * image.height; ++i) {
+    for (std::size_t channel = 0; in_colour && channel < 3; ++channel)
+      light.values.push_back(image.byte(i, is_grey ? 0 : channel));
+    if (in_colour) continue;
     // libpng's weights of red, green and blue
     const unsigned grey =
         is_grey
             ? image.byte(i, 0)
             : (6968U * image.byte(i, 0) + 23434U * image.byte(i, 1) + 2366U * image.byte(i, 2)) >>
                   15U;
-    to.brightness.push_back(static_cast<std::uint8_t>(grey));
-  });
-}
-
-ColourPng read_colour_png(const std::filesystem::path& path) {
-  return decoded<ColourPng>(path, [](const Image& image, std::size_t i, ColourPng& to) {
-    for (std::size_t channel = 0; channel < 3; ++channel)
-      to.rgb.push_back(image.byte(i, image.channels < 3 ? 0 : channel));
-  });
+    light.values.push_back(static_cast<std::uint8_t>(grey));
+  }
+  return light;
 }
 
 std::vector<std::byte> encode_depth_png(int width, int height,
@@ -214,11 +203,6 @@ std::vector<std::byte> encode_depth_png(int width, int height,
   chunk("IDAT", site::pack_zlib(rows));
   chunk("IEND", {});
   return png;
-}
-
-void write_depth_png(const std::filesystem::path& path, int /*width*/, int /*height*/,
-                     std::span<const std::uint16_t> /*depth*/) {
-  throw Error(path.string(), "this page writes no images", "use the program palpate");
 }
 
 }  // namespace palpate

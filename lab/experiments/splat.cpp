@@ -15,7 +15,7 @@
 #include "lab/play.hpp"
 #include "lab/statistics.hpp"
 #include "palpate/io/sources/scene.hpp"
-#include "palpate/io/sources/splat_body.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 
 namespace palpate::lab {
 namespace {

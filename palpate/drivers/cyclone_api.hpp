@@ -21,14 +21,14 @@ struct SerialisedType {
 };
 
 struct TopicDescriptor {
-  std::uint32_t size, align, flags, keys;
-  const char* type_name;
-  const void* key_descriptors;
-  std::uint32_t instruction_count;
-  const std::uint32_t* instructions;
-  const char* meta;
-  SerialisedType type_information, type_mapping;
-  std::uint32_t data_representation;
+  std::uint32_t size = 0, align = 0, flags = 0, keys = 0;
+  const char* type_name = nullptr;
+  const void* key_descriptors = nullptr;
+  std::uint32_t instruction_count = 0;
+  const std::uint32_t* instructions = nullptr;
+  const char* meta = nullptr;
+  SerialisedType type_information{}, type_mapping{};
+  std::uint32_t data_representation = 0;
 };
 
 struct SampleInfo {

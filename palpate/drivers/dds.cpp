@@ -2,11 +2,9 @@
 #include "palpate/drivers/dds.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <tuple>
 #include <utility>
 
 #include "palpate/drivers/cyclone_api.hpp"
@@ -19,8 +17,7 @@ namespace palpate::dds {
 using cyclone::Duration, cyclone::Endpoint, cyclone::Entity, cyclone::Qos, cyclone::Result,
     cyclone::SampleInfo, cyclone::Serdata, cyclone::TopicDescriptor;
 
-// All functions are Cyclone's C API but the last three, with which it hands out messages as they
-// came.
+// Cyclone's C API, and at the end what it hands out messages by as they came.
 struct Library {
   SharedLibrary library{
       {.name = "ros2: (Cyclone DDS)",
@@ -81,9 +78,8 @@ struct Library {
 namespace {
 
 constexpr std::uint32_t largest_domain = 232;
-// [s] that a reliable writer waits for room at most. Not the protocol's default of 0.1 s: Cyclone
-// leaves defaults out of what it tells others, and @foxglove/rtps does not read a writer without
-// it.
+// [s] that a reliable writer waits for room at most. Not the protocol's default of 0.1 s, which
+// Cyclone does not tell others: @foxglove/rtps does not read a writer without it.
 constexpr double blocking_time = 0.05;
 constexpr std::size_t most_publications = 4096;
 
@@ -140,30 +136,21 @@ std::string ros_type(std::string type) {
   return type.replace(at, middle.size(), "/msg/");
 }
 
-// A quality of service, deleted with the object.
-class Offer {
- public:
-  Offer(const Library& library, const Quality& quality)
-      : library_(library), qos_(library.create_qos()) {
-    library.set_reliability(qos_, quality.reliable ? cyclone::reliable : cyclone::best_effort,
-                            duration(blocking_time));
-    library.set_durability(
-        qos_, quality.keeps_for_late ? cyclone::transient_local : cyclone::volatile_data);
-    library.set_history(qos_, cyclone::keep_last, quality.depth);
-    if (quality.lifespan) library.set_lifespan(qos_, duration(*quality.lifespan));
-    if (quality.deadline) library.set_deadline(qos_, duration(*quality.deadline));
-    if (!quality.user_data.empty())
-      library.set_user_data(qos_, quality.user_data.data(), quality.user_data.size());
-  }
-  ~Offer() { library_.delete_qos(qos_); }
-  Offer(const Offer&) = delete;
-  Offer& operator=(const Offer&) = delete;
-  [[nodiscard]] const Qos* get() const { return qos_; }
+using OwnedQos = std::unique_ptr<Qos, void (*)(Qos*)>;
 
- private:
-  const Library& library_;
-  Qos* qos_;
-};
+OwnedQos offer_of(const Library& library, const Quality& quality) {
+  OwnedQos qos(library.create_qos(), library.delete_qos);
+  library.set_reliability(qos.get(), quality.reliable ? cyclone::reliable : cyclone::best_effort,
+                          duration(blocking_time));
+  library.set_durability(
+      qos.get(), quality.keeps_for_late ? cyclone::transient_local : cyclone::volatile_data);
+  library.set_history(qos.get(), cyclone::keep_last, quality.depth);
+  if (quality.lifespan) library.set_lifespan(qos.get(), duration(*quality.lifespan));
+  if (quality.deadline) library.set_deadline(qos.get(), duration(*quality.deadline));
+  if (!quality.user_data.empty())
+    library.set_user_data(qos.get(), quality.user_data.data(), quality.user_data.size());
+  return qos;
+}
 
 std::string user_data_of(const Library& library, const Qos* qos) {
   void* data = nullptr;
@@ -192,59 +179,7 @@ std::optional<std::string> client_of(const Library& library, Endpoint* endpoint)
   return client;
 }
 
-// @param size  1, 2, 4 or 8, whose codes follow one another
-std::uint32_t code_of(std::size_t size) {
-  return cyclone::of_1_byte + static_cast<std::uint32_t>(std::countr_zero(size));
-}
-
 }  // namespace
-
-std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) {
-  using Kind = ros::CField::Kind;
-  std::vector<std::uint32_t> code;
-  // Elements that are structs have their instructions behind, to which their sequence points.
-  std::vector<std::pair<std::size_t, const std::vector<ros::CField>*>> waiting{{0, &fields}};
-  for (std::size_t i = 0; i < waiting.size(); ++i) {
-    const auto [from, struct_fields] = waiting[i];
-    if (i > 0) code[from + 3] |= static_cast<std::uint32_t>(code.size() - from);
-    for (const ros::CField& field : *struct_fields) {
-      const std::size_t begin = code.size();
-      const auto put = [&](std::uint32_t type, std::uint32_t element) {
-        code.push_back(cyclone::op_field | type << 16 | element << 8);
-        code.push_back(static_cast<std::uint32_t>(field.offset));
-      };
-      switch (field.kind) {
-        case Kind::number:
-          put(code_of(field.size), 0);
-          break;
-        case Kind::flag:
-          put(cyclone::of_flag, 0);
-          break;
-        case Kind::text:
-          put(cyclone::of_text, 0);
-          break;
-        case Kind::numbers:
-          put(cyclone::of_sequence, code_of(field.size));
-          break;
-        case Kind::texts:
-          put(cyclone::of_sequence, cyclone::of_text);
-          break;
-        case Kind::array:
-          put(cyclone::of_array, code_of(field.size));
-          code.push_back(static_cast<std::uint32_t>(field.count));
-          break;
-        case Kind::structs:
-          put(cyclone::of_sequence, cyclone::of_struct);
-          code.push_back(static_cast<std::uint32_t>(field.size));
-          code.push_back(4U << 16);
-          waiting.emplace_back(begin, &field.fields);
-          break;
-      }
-    }
-    code.push_back(cyclone::op_return);
-  }
-  return code;
-}
 
 ros::Time stamp_of(double monotonic) { return ros::Time::at(since_1970(monotonic)); }
 
@@ -273,7 +208,7 @@ Participant::Participant(const std::string& who, std::string_view user_data)
   // A domain lives until the process ends, and belongs to all that take part in it.
   const Entity domain = library_->create_domain(domain_, settings().c_str());
   if (domain != cyclone::precondition_not_met) check(domain, "it cannot take part in the network");
-  const Offer offer(*library_, {.user_data = user_data});
+  const OwnedQos offer = offer_of(*library_, {.user_data = user_data});
   entity_ =
       library_->create_participant(domain_, user_data.empty() ? nullptr : offer.get(), nullptr);
   check(entity_, "it cannot take part in domain " + std::to_string(domain_));
@@ -312,9 +247,7 @@ std::vector<Publication> Participant::publications() {
     if (topic.starts_with(prefix))
       heard.push_back({topic.substr(prefix.size() - 1), ros_type(endpoint.type_name)});
   });
-  std::sort(heard.begin(), heard.end(), [](const auto& a, const auto& b) {
-    return std::tie(a.topic, a.type) < std::tie(b.topic, b.type);
-  });
+  std::sort(heard.begin(), heard.end());
   heard.erase(std::unique(heard.begin(), heard.end()), heard.end());
   return heard;
 }
@@ -340,22 +273,16 @@ void Participant::wait(double seconds) {
   library_->wait(waitset_, nullptr, 0, duration(std::max(seconds, 0.0)));
 }
 
-int Participant::topic(const std::string& name, std::string_view type,
-                       const ros::CSample& example) {
-  const std::vector<std::uint32_t> code = instructions(example.fields());
+int Participant::topic(const std::string& name, std::string_view type, const CSample& example) {
+  const std::vector<std::uint32_t>& code = example.instructions();
   const std::string type_name = dds_type(type);
   const TopicDescriptor descriptor{.size = static_cast<std::uint32_t>(example.size()),
                                    .align = 8,
                                    .flags = cyclone::no_optimise,
-                                   .keys = 0,
                                    .type_name = type_name.c_str(),
-                                   .key_descriptors = nullptr,
                                    .instruction_count = static_cast<std::uint32_t>(code.size()),
                                    .instructions = code.data(),
-                                   .meta = "",
-                                   .type_information = {},
-                                   .type_mapping = {},
-                                   .data_representation = 0};
+                                   .meta = ""};
   const std::string dds_name = dds_topic(name, type);
   const int topic =
       library_->create_topic(entity_, &descriptor, dds_name.c_str(), nullptr, nullptr);
@@ -363,41 +290,37 @@ int Participant::topic(const std::string& name, std::string_view type,
   return topic;
 }
 
-Reader::Reader(Participant& participant, const std::string& topic, std::string_view type,
-               const ros::CSample& example, const Quality& quality)
+TopicEnd::TopicEnd(Participant& participant, const std::string& topic, std::string_view type,
+                   const CSample& example, const Quality& quality, bool reads)
     : participant_(participant), topic_(topic) {
   const Library& library = *participant.library_;
-  const Offer offer(library, quality);
+  const OwnedQos offer = offer_of(library, quality);
   const int of_dds = participant.topic(topic, type, example);
-  entity_ = library.create_reader(participant.entity_, of_dds, offer.get(), nullptr);
-  library.remove(of_dds);  // it lives as long as its reader
-  participant.check(entity_, "it cannot read " + topic);
+  const auto create = reads ? library.create_reader : library.create_writer;
+  entity_ = create(participant.entity_, of_dds, offer.get(), nullptr);
+  library.remove(of_dds);  // it lives as long as what reads or writes it
+  participant.check(entity_, (reads ? "it cannot read " : "it cannot write ") + topic);
+  if (!reads) return;
   library.set_status_mask(entity_, cyclone::data_available);
   library.attach(participant.waitset_, entity_, 0);
 }
 
-Reader::~Reader() { participant_.library_->remove(entity_); }
+TopicEnd::~TopicEnd() { participant_.library_->remove(entity_); }
+
+Guid TopicEnd::guid() const { return guid_of(*participant_.library_, entity_); }
 
 bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
   const Library& library = *participant_.library_;
   Serdata* message = nullptr;
   SampleInfo info{};
   while (library.take_cdr(entity_, &message, 1, &info, cyclone::any_state) == 1) {
-    struct Release {
-      const Library& library;
-      Serdata* message;
-      ~Release() { library.cdr_release(message); }
-    } const release{library, message};
+    const std::unique_ptr<Serdata, void (*)(Serdata*)> owned(message, library.cdr_release);
     if (!info.valid_data) continue;  // a writer that went
     sender_ = info.publication_handle;
     iovec place{};
-    struct Unreference {
-      const Library& library;
-      Serdata* message;
-      const iovec& place;
-      ~Unreference() { library.cdr_unreference(message, &place); }
-    } const unreference{
-        library, library.cdr_reference(message, 0, library.cdr_size(message), &place), place};
+    const auto unreference = [&](Serdata* referred) { library.cdr_unreference(referred, &place); };
+    const std::unique_ptr<Serdata, decltype(unreference)> reference(
+        library.cdr_reference(message, 0, library.cdr_size(message), &place), unreference);
     use({static_cast<const std::byte*>(place.iov_base), place.iov_len});
     return true;
   }
@@ -408,20 +331,7 @@ int Reader::writers() const {
   return std::max(participant_.library_->matched_writers(entity_, nullptr, 0), 0);
 }
 
-Writer::Writer(Participant& participant, const std::string& topic, std::string_view type,
-               const ros::CSample& example, const Quality& quality)
-    : participant_(participant) {
-  const Library& library = *participant.library_;
-  const Offer offer(library, quality);
-  const int of_dds = participant.topic(topic, type, example);
-  entity_ = library.create_writer(participant.entity_, of_dds, offer.get(), nullptr);
-  library.remove(of_dds);  // it lives as long as its writer
-  participant.check(entity_, "it cannot write " + topic);
-}
-
-Writer::~Writer() { participant_.library_->remove(entity_); }
-
-bool Writer::write_sample(const ros::CSample& sample) {
+bool Writer::write_sample(const CSample& sample) {
   return participant_.library_->write(entity_, sample.data()) >= 0;
 }
 
@@ -432,10 +342,6 @@ bool Writer::wait_for_readers(double seconds) {
 int Writer::readers() const {
   return std::max(participant_.library_->matched_readers(entity_, nullptr, 0), 0);
 }
-
-Guid Reader::guid() const { return guid_of(*participant_.library_, entity_); }
-
-Guid Writer::guid() const { return guid_of(*participant_.library_, entity_); }
 
 Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies) {
   const Library& library = *replies.participant_.library_;

@@ -15,17 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/io/bag/c_sample.hpp"
+#include "palpate/drivers/c_sample.hpp"
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-// ROS 2's topics without ROS: by Eclipse Cyclone DDS's library, which is loaded when it is asked
-// for. Topics and types have the names that ROS gives them: /camera/depth/image_raw,
-// sensor_msgs/msg/Image.
-namespace palpate::cyclone {
-struct Endpoint;
-}
-
+// ROS 2's topics without ROS, by Eclipse Cyclone DDS's library. Topics and types have the names
+// that ROS gives them: /camera/depth/image_raw, sensor_msgs/msg/Image.
 namespace palpate::dds {
 
 /// What a reader asks for, or a writer offers. A best-effort reader takes from every writer, and
@@ -52,7 +47,7 @@ enum class Generation : std::uint8_t {
 /// What somebody publishes.
 struct Publication {
   std::string topic, type;
-  friend bool operator==(const Publication&, const Publication&) = default;
+  friend auto operator<=>(const Publication&, const Publication&) = default;
 };
 
 struct Library;
@@ -85,12 +80,12 @@ class Participant {
   void wait(double seconds);
 
  private:
+  friend class TopicEnd;
   friend class Reader;
   friend class Writer;
   friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
   void each_publication(const std::function<void(const cyclone::Endpoint&)>& use);
-  [[nodiscard]] int topic(const std::string& name, std::string_view type,
-                          const ros::CSample& example);
+  [[nodiscard]] int topic(const std::string& name, std::string_view type, const CSample& example);
   void check(int entity, const std::string& what) const;
 
   std::string who_;
@@ -99,8 +94,28 @@ class Participant {
   int entity_ = 0, publications_ = 0, waitset_ = 0;
 };
 
+/// What reads or writes a topic.
+class TopicEnd {
+ public:
+  TopicEnd(const TopicEnd&) = delete;
+  TopicEnd& operator=(const TopicEnd&) = delete;
+  [[nodiscard]] Guid guid() const;
+
+ protected:
+  TopicEnd(Participant& participant, const std::string& topic, std::string_view type,
+           const CSample& example, const Quality& quality, bool reads);
+  ~TopicEnd();
+
+  Participant& participant_;
+  std::string topic_;
+  int entity_ = 0;
+
+ private:
+  friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
+};
+
 /// Reads a topic.
-class Reader {
+class Reader : public TopicEnd {
  public:
   /// @param participant  must outlive this
   /// @param example      any message of the type
@@ -108,10 +123,7 @@ class Reader {
   template <class Message>
   Reader(Participant& participant, const std::string& topic, const Message& example,
          const Quality& quality)
-      : Reader(participant, topic, Message::type, ros::CSample(example), quality) {}
-  ~Reader();
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+      : TopicEnd(participant, topic, Message::type, CSample(example), quality, true) {}
 
   /// Takes the oldest message that is there, if any, and hands its CDR to `use`.
   bool take(const std::function<void(std::span<const std::byte>)>& use);
@@ -137,57 +149,36 @@ class Reader {
   [[nodiscard]] int writers() const;
   /// Whose the message was that was taken last: for `listening`.
   [[nodiscard]] std::uint64_t sender() const { return sender_; }
-  [[nodiscard]] Guid guid() const;
 
  private:
-  friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
-  Reader(Participant& participant, const std::string& topic, std::string_view type,
-         const ros::CSample& example, const Quality& quality);
-
-  Participant& participant_;
-  std::string topic_;
-  int entity_ = 0;
   std::uint64_t sender_ = 0;
 };
 
 /// Writes a topic.
-class Writer {
+class Writer : public TopicEnd {
  public:
   /// As for Reader.
   template <class Message>
   Writer(Participant& participant, const std::string& topic, const Message& example,
          const Quality& quality)
-      : Writer(participant, topic, Message::type, ros::CSample(example), quality) {}
-  ~Writer();
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
+      : TopicEnd(participant, topic, Message::type, CSample(example), quality, false) {}
 
   /// @return false if it could not be sent.
   template <class Message>
   bool write(const Message& message) {
-    return write_sample(ros::CSample(message));
+    return write_sample(CSample(message));
   }
   /// Waits until all reliable readers have what was written, up to `seconds`.
   bool wait_for_readers(double seconds);
   /// How many readers there are now.
   [[nodiscard]] int readers() const;
-  [[nodiscard]] Guid guid() const;
 
  private:
-  friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
-  Writer(Participant& participant, const std::string& topic, std::string_view type,
-         const ros::CSample& example, const Quality& quality);
-  bool write_sample(const ros::CSample& sample);
-
-  Participant& participant_;
-  int entity_ = 0;
+  bool write_sample(const CSample& sample);
 };
 
 /// @param client  Reader::sender of its request
 Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
-
-/// The instructions by which Cyclone DDS writes and reads such a struct.
-std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields);
 
 /// A time of the servo loop's clock [s] on the wall's, which stamps of ROS are on.
 ros::Time stamp_of(double monotonic);
@@ -216,8 +207,7 @@ inline std::string service_identity(const Guid& participant, unsigned number) {
 }
 
 /// A service of a node, asked and answered as rmw_cyclonedds_cpp does: each message begins with who
-/// asked and the number of the request. (rmw_fastrtps_cpp says that outside of the message, where
-/// Cyclone's C API cannot write.)
+/// asked and its number. (rmw_fastrtps_cpp says that where Cyclone's C API cannot write.)
 template <class Type>
 class Service {
  public:
@@ -228,8 +218,7 @@ class Service {
   /// @param answer  must not throw
   Service(Participant& participant, const std::string& name, unsigned number,
           std::function<Reply(const Request&)> answer)
-      : name_(name),
-        identity_(service_identity(participant.guid(), number)),
+      : identity_(service_identity(participant.guid(), number)),
         requests_(participant, name, Request{}, service_quality(identity_)),
         replies_(participant, name, Reply{}, service_quality(identity_)),
         answer_(std::move(answer)) {}
@@ -268,7 +257,7 @@ class Service {
     double since;
   };
 
-  std::string name_, identity_;
+  std::string identity_;
   Reader requests_;
   Writer replies_;
   std::function<Reply(const Request&)> answer_;

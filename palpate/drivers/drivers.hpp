@@ -49,8 +49,7 @@ struct Driver {
   std::function<std::unique_ptr<Source>(const Uri&)> open_camera = {};
   /// Opens a device, or empty. @throws Error
   std::function<std::unique_ptr<Device>(const Uri&)> open_device = {};
-  /// Looks at library and hardware without moving anything. Never throws: what it meets is in the
-  /// report.
+  /// Looks at library and hardware without moving anything. Never throws: the report has it.
   std::function<DriverReport()> look = {};
   /// A device with motors that hold their force when this process dies: what opens it by name puts
   /// it into a guard's process (open_guarded) before it has other threads.

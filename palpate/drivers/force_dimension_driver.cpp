@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -202,7 +203,7 @@ class Arm final : public Device {
     state.present = false;
     state.fault = DeviceFault::disconnected;
     if (reopener_->is_lost()) return state;
-    const DriverCalls::Turn turn(calls_);
+    const std::unique_lock turn(calls_, std::try_to_lock);
     if (!turn) return state;
     double x = 0.0;
     double y = 0.0;
@@ -228,7 +229,7 @@ class Arm final : public Device {
 
   void write(const Wrench& wrench, double t) noexcept override {
     if (reopener_->is_lost()) return;
-    const DriverCalls::Turn turn(calls_);
+    const std::unique_lock turn(calls_, std::try_to_lock);
     if (!turn) return;
     const bool enabled = enabled_.load(std::memory_order_acquire);
     if (!enabled || !wrench.force.isZero(0.0) || !wrench.torque.isZero(0.0)) last_force_ = t;
@@ -248,7 +249,7 @@ class Arm final : public Device {
 
   void enable() override {
     bool done = false;
-    const bool called = calls_.call(call_time, [&] {
+    const bool called = call_when_free(calls_, call_time, [&] {
       done = send({}) && sdk_->enable_force(1, id()) >= 0;
       if (done) enabled_.store(true, std::memory_order_release);
     });
@@ -262,7 +263,7 @@ class Arm final : public Device {
   // firmware's watchdog does when it does not.
   void disable() noexcept override {
     enabled_.store(false, std::memory_order_release);
-    const DriverCalls::Turn turn(calls_);
+    const std::unique_lock turn(calls_, std::try_to_lock);
     if (!turn || reopener_ == nullptr || reopener_->is_lost()) return;
     send({});
     sdk_->enable_force(0, id());
@@ -441,7 +442,7 @@ class Arm final : public Device {
   // On the reopener's thread.
   bool open_again() noexcept {
     bool done = false;
-    const bool called = calls_.call(call_time, [&] {
+    const bool called = call_when_free(calls_, call_time, [&] {
       try {
         sdk_->close(id());
         open();
@@ -459,7 +460,7 @@ class Arm final : public Device {
   DeviceInfo info_;
   bool has_wrist_ = false;
   std::atomic<char> id_{0};
-  DriverCalls calls_;
+  std::mutex calls_;  // of the driver; whoever does not get it at once goes on without
   std::atomic<bool> enabled_{false};
   std::atomic<bool> off_{false};  // the arm has switched its forces off by itself
   std::atomic<OffCause> cause_{OffCause::none};
@@ -522,12 +523,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace force_dimension
 
-/// Force Dimension's arms (omega, delta, sigma, lambda) and Novint's Falcon, by Force Dimension's
-/// library libdrd or libdhd: `force-dimension:[SERIAL]`, polled.
-///
-/// Device frame: x to the right, y away from the user, z up, origin in the middle of the workspace.
-/// The arm's firmware takes its force away when no force was sent for `watchdog` (20 ms), whatever
-/// has become of this process; sessions may rely on it (DeviceInfo::watchdog).
+/// docs/devices.md describes it. The arm's firmware takes its force away when no force was sent for
+/// `watchdog`, whatever has become of this process; sessions may rely on it (DeviceInfo::watchdog).
 Driver force_dimension_driver() {
   return {.name = "force-dimension",
           .summary = "Force Dimension's omega, delta, sigma and lambda, and the Novint Falcon",

@@ -130,12 +130,11 @@ class Pad final : public Sticks {
 };
 
 std::unique_ptr<Device> open_pad(const Uri& uri) {
-  uri.allow_only(rate_option_names);
+  const RateOptions options = rate_options(uri);
   const std::string& number = uri.path();
   if (number.size() > 1 || number.find_first_not_of("0123456789") != std::string::npos)
     throw Error(uri.text(), "'" + number + "' is no number of a game controller",
                 "write gamepad:, or gamepad:1 for the second");
-  const RateOptions options = rate_options(uri);
   auto pad = std::make_unique<Pad>(uri.text(), number.empty() ? 0 : number.front() - '0');
   DeviceInfo info{.uri = uri.text(), .kind = pad->name() + " by SDL2", .limits = no_motors};
   return std::make_unique<RateHand>(std::move(pad), info, options);
@@ -161,8 +160,6 @@ DriverReport look() {
 }  // namespace
 }  // namespace gamepad
 
-/// A game controller by SDL2: `gamepad:[INDEX]`. Its left stick moves the hand sideways and away,
-/// its right stick up and down, by rate control; a contact is felt as rumble.
 Driver gamepad_driver() {
   return {.name = "gamepad",
           .summary = "a game controller by SDL2: moves the hand, rumbles at a contact",

@@ -109,8 +109,7 @@ std::string http_get(const std::string& host, int port, const std::string& targe
   return response.body();
 }
 
-// A client's end of a WebSocket, without TLS. One thread; nothing waits for longer than it is
-// told.
+// A client's end of a WebSocket, without TLS. One thread; nothing waits for longer than told.
 class WebSocket {
  public:
   // Connects and shakes hands. @param timeout  [s] for each of both, and for each text to be sent
@@ -214,7 +213,6 @@ const char* remedy() {
          "by ?host=NAME&port=NUMBER";
 }
 
-// What the service says of its version, or nothing.
 std::string version_of(const Wanted& wanted) {
   try {
     return Json::parse(http_get(wanted.host, wanted.port, "/version", 1.0)).value("git_tag", "");
@@ -223,7 +221,6 @@ std::string version_of(const Wanted& wanted) {
   }
 }
 
-// @throws Error with the remedy
 std::unique_ptr<WebSocket> connected(const Wanted& wanted) {
   try {
     return std::make_unique<WebSocket>(wanted.host, wanted.port, opening_time);
@@ -356,8 +353,7 @@ class Inverse final : public ChannelHand {
     }
   }
 
-  // No hand for long enough that the servo's safety chain sees it and lets go, whatever the next
-  // answer says.
+  // No hand for long enough that the safety chain lets go, whatever the next answer says.
   void let_go(DeviceFault fault) {
     newest_.state.fault = rest_fault_ = fault;
     newest_.time = monotonic_now();
@@ -450,14 +446,12 @@ class Inverse final : public ChannelHand {
            std::string(text.data(), static_cast<std::size_t>(length));
   }
 
-  // What to send now.
   Vec3 next_force() {
     // A channel that is late misses the beginning of a force: it must not begin with a step.
     const Vec3 force = newest_force(std::min(wanted_.max_force, asked_.norm() + most_rise));
     return asked_ = newest_.state.fault == DeviceFault::none ? force : Vec3::Zero();
   }
 
-  // A state that the service has sent.
   void take(const Json& message, double now) {
     const Json device = device_in(message, id_);
     if (!device.contains("state")) return let_go(DeviceFault::disconnected);
@@ -471,7 +465,7 @@ class Inverse final : public ChannelHand {
     newest_.time = now;
     seen_.put(newest_);
     doubt(vector_of(told, "current_cursor_force", Vec3::Zero()));
-    if (state.fault == DeviceFault::none) set_trouble_once("");
+    if (state.fault == DeviceFault::none) set_trouble("");
   }
 
   // The service says which force it gives. If it gives none although one is asked for, the command
@@ -487,18 +481,12 @@ class Inverse final : public ChannelHand {
     doubts_ = 0;
     let_go(DeviceFault::refused_command);
     if (std::exchange(changed_, true)) {
-      set_trouble_once(
+      set_trouble(
           "the service takes no force, neither by 'values' nor by 'vector'; use a "
           "version of it from 3.1 on");
       return;
     }
     key_ = std::string_view(key_) == "values" ? "vector" : "values";
-  }
-
-  void set_trouble_once(const char* text) {
-    if (text_ == text) return;
-    text_ = text;
-    set_trouble(text);
   }
 
   Wanted wanted_;
@@ -514,7 +502,6 @@ class Inverse final : public ChannelHand {
   bool confirmed_ = false, changed_ = false;
   double rest_until_ = 0.0;  // [s] no hand until then
   DeviceFault rest_fault_ = DeviceFault::none;
-  std::string_view text_ = "-";
   std::thread thread_;
 };
 
@@ -553,12 +540,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace haply
 
-/// Haply's Inverse3, Inverse3x and Minverse, by their Inverse Service: `haply:[DEVICE_ID]`, JSON
-/// over a WebSocket on a thread of its own, so that a service that hangs never holds a tick.
-///
-/// Device frame: x to the right, y away from the user, z up, origin in the middle of the workspace.
-/// What the service does with the last force when it is not spoken to any more is not documented
-/// with a time, so a program holds it by a guard (open_guarded).
+/// docs/devices.md describes it. What the service does with the last force when it is not spoken to
+/// any more is not documented with a time, so a program holds it by a guard (open_guarded).
 Driver haply_driver() {
   return {.name = "haply",
           .summary = "Haply's Inverse3, Inverse3x and Minverse, by their Inverse Service",

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -29,17 +30,13 @@ std::vector<std::uint16_t> depth_rows(const void* data, int width, int height, s
   const std::size_t row = sizeof(std::uint16_t) * static_cast<std::size_t>(std::max(width, 0));
   if (data == nullptr || width < 1 || height < 1 || stride < row)
     throw Error(camera,
-                "it gives images of " + std::to_string(width) + "x" + std::to_string(height) +
-                    " pixels in rows of " + std::to_string(stride) + " bytes",
+                "it gives images of " + size_text(width, height) + " pixels in rows of " +
+                    std::to_string(stride) + " bytes",
                 "its library or firmware may be of another version");
   std::vector<std::uint16_t> depth(static_cast<std::size_t>(width) *
                                    static_cast<std::size_t>(height));
   const auto* from = static_cast<const std::byte*>(data);
   auto* to = reinterpret_cast<std::byte*>(depth.data());
-  if (stride == row) {
-    std::memcpy(to, from, row * static_cast<std::size_t>(height));
-    return depth;
-  }
   for (int v = 0; v < height; ++v, from += stride, to += row) std::memcpy(to, from, row);
   return depth;
 }

@@ -228,7 +228,7 @@ class Pen final : public Device {
     state.present = false;
     state.fault = DeviceFault::disconnected;
     if (reopener_->is_lost()) return state;
-    const DriverCalls::Turn turn(calls_);
+    const std::unique_lock turn(calls_, std::try_to_lock);
     if (!turn) return state;
     in_frame_ = true;
     hd_->begin_frame(handle_);
@@ -264,7 +264,7 @@ class Pen final : public Device {
   void write(const Vec3& force, double t) noexcept override {
     const bool in_frame = std::exchange(in_frame_, false);
     if (reopener_->is_lost()) return;
-    const DriverCalls::Turn turn(calls_);
+    const std::unique_lock turn(calls_, std::try_to_lock);
     if (!turn) return;
     if (!in_frame) hd_->begin_frame(handle_);  // the last write, which no read came before
     const bool enabled = enabled_.load(std::memory_order_acquire);
@@ -279,7 +279,7 @@ class Pen final : public Device {
 
   void enable() override {
     unsigned error = success;
-    const bool called = calls_.call(call_time, [&] {
+    const bool called = call_when_free(calls_, call_time, [&] {
       hd_->make_current_device(handle_);
       hd_->take_errors();
       hd_->enable(force_output);
@@ -295,7 +295,7 @@ class Pen final : public Device {
   // While the scheduler's thread is within a call, that one switches the force off when it returns.
   void disable() noexcept override {
     enabled_.store(false, std::memory_order_release);
-    const DriverCalls::Turn turn(calls_);
+    const std::unique_lock turn(calls_, std::try_to_lock);
     if (!turn) return;
     hd_->make_current_device(handle_);
     hd_->disable(force_output);
@@ -430,7 +430,7 @@ class Pen final : public Device {
     const bool ran = running_;
     stop_scheduler();
     bool done = false;
-    calls_.call(call_time, [&] {
+    call_when_free(calls_, call_time, [&] {
       try {
         hd_->disable_device(handle_);
         hd_->take_errors();
@@ -454,7 +454,7 @@ class Pen final : public Device {
   bool running_ = false;
   unsigned long callback_ = 0;
   CycleCallback cycle_;
-  DriverCalls calls_;
+  std::mutex calls_;  // of the driver; whoever does not get it at once goes on without
   std::atomic<bool> enabled_{false}, ending_{false}, hot_{false};
   std::atomic<DeviceFault> fault_{DeviceFault::none};
   // Of the scheduler's thread:
@@ -503,12 +503,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace open_haptics
 
-/// 3D Systems' Touch and Touch X, SensAble's Phantoms, by the HD layer of OpenHaptics (libHD):
-/// `touch:[NAME]`, whose scheduler calls the cycle (Device::drives).
-///
-/// Device frame: x to the right, y away from the user, z up, origin as the vendor has it, in the
-/// middle of the workspace. What the hardware does when its computer dies is not documented, so a
-/// program holds it by a guard (open_guarded).
+/// docs/devices.md describes it. Its scheduler calls the cycle (Device::drives). What the hardware
+/// does when its computer dies is not documented, so a program holds it by a guard (open_guarded).
 Driver open_haptics_driver() {
   return {.name = "touch",
           .summary = "3D Systems' Touch and Touch X, SensAble's Phantoms, by OpenHaptics",

@@ -15,6 +15,7 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
@@ -59,9 +60,8 @@ constexpr int colour_sensor = 2, depth_sensor = 3;
 constexpr int format_1_mm = 100, format_100_um = 101, format_rgb888 = 200;
 constexpr int firmware_property = 0, serial_property = 3, registration_property = 5;  // of a device
 constexpr int horizontal_fov = 1, vertical_fov = 2, mode_property = 3, mirroring = 7;  // of streams
-constexpr int most_pixels =
-    640 * 480;                   // of the size that is chosen; what is larger is interpolated
-constexpr double silence = 0.5;  // [s] without a frame after which the camera is looked for
+constexpr int most_pixels = 640 * 480;  // that are chosen; what is larger is interpolated
+constexpr double silence = 0.5;         // [s] without a frame after which the camera is looked for
 constexpr DepthRange measurable{0.3, 10.0};  // [m]
 constexpr const char* plug_in =
     "plug it in; if it is, install the package libopenni2-0 with its udev rules, and for a Kinect "
@@ -133,10 +133,8 @@ struct Api {
   void (*frame_release)(ImageFrame*) = library.find("oniFrameRelease");
 };
 
-template <class Thing, class Close>
-using Owned = std::unique_ptr<Thing, Close>;
-using OwnedDevice = Owned<Device, int (*)(Device*)>;
-using OwnedStream = Owned<Stream, void (*)(Stream*)>;
+using OwnedDevice = std::unique_ptr<Device, int (*)(Device*)>;
+using OwnedStream = std::unique_ptr<Stream, void (*)(Stream*)>;
 
 DriverReport look() {
   const Api api;
@@ -267,8 +265,8 @@ class Camera final : public LiveCamera {
     for (int i = 0; list != nullptr && i < list->count; ++i) {
       const VideoMode& mode = list->modes[i];
       if (mode.format != format_1_mm && mode.format != format_100_um) continue;
-      add_to_list(offered, std::to_string(mode.width) + "x" + std::to_string(mode.height) + " at " +
-                               std::to_string(mode.rate) + " Hz");
+      add_to_list(offered,
+                  size_text(mode.width, mode.height) + " at " + std::to_string(mode.rate) + " Hz");
       if ((wanted.width != 0 && mode.width != wanted.width) ||
           (wanted.height != 0 && mode.height != wanted.height) ||
           (wanted.rate != 0 && mode.rate != wanted.rate))
@@ -285,8 +283,7 @@ class Camera final : public LiveCamera {
     vertical_view_ = field_of_view(vertical_fov);
   }
 
-  // [rad] Asked before anything runs: OpenNI2's own Dummy has none, and crashes when it is closed
-  // soon after it ran.
+  // [rad] Asked before anything runs: OpenNI2's own Dummy has none, and crashes once it ran.
   [[nodiscard]] double field_of_view(int which) const {
     float angle = 0.0F;  // [rad]
     int size = sizeof angle;
@@ -333,7 +330,7 @@ class Camera final : public LiveCamera {
           given == nullptr)
         throw Error(info_.uri, "it gives no frame: " + api_.said(), "plug it in again");
       last_frame_ = monotonic_now();
-      const Owned<ImageFrame, void (*)(ImageFrame*)> image(given, api_.frame_release);
+      const std::unique_ptr<ImageFrame, void (*)(ImageFrame*)> image(given, api_.frame_release);
       if (ready == 0) return depth_of(*image);
       keep_colour(*image);
     }
@@ -409,13 +406,7 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
-/// `openni2:`, `openni2:SERIAL` or `openni2:FILE.oni`, by OpenNI2's C interface, which is loaded
-/// when it is asked for: Kinect v1, Xtion, Carmine, Astra. A path may also be an address as
-/// OpenNI2 lists it.
-///
-/// Options: `width`, `height` [px] and `fps` [Hz] of the depth, otherwise the largest
-/// size up to 640 x 480; `colour` adds colour images, with the depth registered to them by the
-/// device. Mirroring, on by default in OpenNI2, is switched off. A recording plays at its own pace.
+/// docs/cameras.md describes it. A path may also be an address as OpenNI2 lists it.
 Driver openni2_driver() {
   return {.name = "openni2",
           .summary = "openni2:SERIAL|FILE.oni, a Kinect v1, Xtion, Carmine or Astra by OpenNI2",

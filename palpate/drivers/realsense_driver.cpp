@@ -13,6 +13,7 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/realsense_lens.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -66,7 +67,6 @@ constexpr double silence = 0.5;  // [s] without a frame after which the camera i
 constexpr DepthRange stereo_range{0.05, 20.0};  // [m] the D405 sees the nearest
 constexpr DepthRange other_range{0.15, 10.0};   // [m] L515 and SR300 series
 
-// What a call of the library refused.
 class Refusal : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -246,16 +246,6 @@ Owned<DepthSensor> depth_sensor(const Api& api, const CameraDevice* device) {
   return {nullptr, api.delete_sensor};
 }
 
-struct ProfileData {
-  int stream = 0, format = 0, index = 0, id = 0, rate = 0;
-};
-
-ProfileData data_of(const Api& api, const StreamProfile* profile) {
-  ProfileData data;
-  api.get_profile_data(profile, &data.stream, &data.format, &data.index, &data.id, &data.rate);
-  return data;
-}
-
 DriverReport look() {
   const Api api;
   DriverReport report{.library = api.library.path(), .version = version_of(api.version)};
@@ -287,23 +277,17 @@ DriverReport look() {
 }
 
 RealSenseLens lens_of(const LibraryIntrinsics& given) {
-  RealSenseLens lens{.width = given.width,
-                     .height = given.height,
-                     .ppx = given.ppx,
-                     .ppy = given.ppy,
-                     .fx = given.fx,
-                     .fy = given.fy,
-                     .model = "of number " + std::to_string(given.model),
-                     .coeffs = {}};
+  RealSenseLens lens{.pinhole = {.width = given.width,
+                                 .height = given.height,
+                                 .fx = given.fx,
+                                 .fy = given.fy,
+                                 .cx = given.ppx,
+                                 .cy = given.ppy},
+                     .model = "of number " + std::to_string(given.model)};
   if (given.model >= 0 && given.model < static_cast<int>(distortions.size()))
     lens.model = distortions.at(static_cast<std::size_t>(given.model));
   std::copy(given.coeffs.begin(), given.coeffs.end(), lens.coeffs.begin());
   return lens;
-}
-
-double system_now() {
-  using std::chrono::duration;
-  return duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 class Camera final : public LiveCamera {
@@ -450,12 +434,13 @@ class Camera final : public LiveCamera {
     for (int i = 0; i < count; ++i) {
       const Owned<LibraryFrame> part(api_.extract_frame(set, i), api_.release_frame);
       const StreamProfile* profile = api_.get_stream_profile(part.get());
-      const ProfileData data = data_of(api_, profile);
-      if (data.stream == stream_depth && data.format == format_z16) {
-        info_.frame_rate = data.rate;
+      int stream = 0, format = 0, index = 0, id = 0, rate = 0;
+      api_.get_profile_data(profile, &stream, &format, &index, &id, &rate);
+      if (stream == stream_depth && format == format_z16) {
+        info_.frame_rate = rate;
         depth_profile = profile;
         frame = depth_of(part.get(), profile);
-      } else if (data.stream == stream_colour && data.format == format_rgb8) {
+      } else if (stream == stream_colour && format == format_rgb8) {
         colour_profile = profile;
         colour = colour_of(part.get(), profile);
       }
@@ -487,9 +472,8 @@ class Camera final : public LiveCamera {
     const int height = api_.get_frame_height(part);
     if (width != k.width || height != k.height)
       throw Error(info_.uri,
-                  "it gives images of " + std::to_string(width) + "x" + std::to_string(height) +
-                      " pixels with a lens for " + std::to_string(k.width) + "x" +
-                      std::to_string(k.height),
+                  "it gives images of " + size_text(width, height) + " pixels with a lens for " +
+                      size_text(k.width, k.height),
                   "update firmware and library");
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
     const double unit = api_.get_units(part);  // [m]
@@ -510,7 +494,8 @@ class Camera final : public LiveCamera {
   }
 
   void stamp(const LibraryFrame* part, Frame& frame) const {
-    const double now = system_now();
+    const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+    const double now = std::chrono::duration<double>(since_1970).count();
     double arrival = now;  // [s since 1970]
     if (api_.supports_metadata(part, metadata_arrival) != 0)
       arrival = 1e-3 * static_cast<double>(api_.get_metadata(part, metadata_arrival));
@@ -549,17 +534,8 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
-/// `realsense:` or `realsense:SERIAL`, by librealsense2, which is loaded when it is asked for.
-///
-/// Options: `width`, `height` [px] and `fps` [Hz] of the depth, its default otherwise; `colour`
-/// adds colour images; `preset` (`default`, `hand`, `high-accuracy`, `high-density`,
-/// `medium-density`), `laser` (0: off, else [mW]) and `exposure` [s], which switches automatic
-/// exposure off, are left as they are unless given.
-///
-/// The unit of depth is that of each frame. Stamps of the global and the system's time are on
-/// StampClock::system, which shows the camera's latency; a camera that offers neither is followed
-/// by its own clock. A frame that says it has the camera's own time all the same, as the first ones
-/// after the start do, gets the time at which it arrived.
+/// docs/cameras.md describes it. A frame that says it has the camera's own time although the clock
+/// is the system's, as the first ones after the start do, gets the time at which it arrived.
 Driver realsense_driver() {
   return {.name = "realsense",
           .summary = "realsense:SERIAL, a RealSense camera by librealsense2",

@@ -3,14 +3,17 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <ctime>
 #include <functional>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include <semaphore.h>
+
+#include "palpate/servo/realtime.hpp"
 
 namespace palpate {
 
@@ -54,58 +57,59 @@ class WakeUp {
   sem_t semaphore_{};
 };
 
-/// Lets one thread at a time call a driver whose functions may hang. Nobody waits unless told to.
-class DriverCalls {
- public:
-  /// Holds the driver from construction on, if nobody else did.
-  class Turn {
-   public:
-    explicit Turn(DriverCalls& calls) noexcept
-        : calls_(calls), has_(!calls.busy_.test_and_set(std::memory_order_acquire)) {}
-    ~Turn() {
-      if (has_) calls_.busy_.clear(std::memory_order_release);
+/// Does `work` under a lock that nobody else waits for: of a driver whose functions may hang, which
+/// one thread at a time calls. Tries for up to `timeout` [s]. @return false if it could not
+template <class Work>
+bool call_when_free(std::mutex& calls, double timeout, const Work& work) {
+  for (const double end = monotonic_now() + timeout;;) {
+    if (const std::unique_lock turn(calls, std::try_to_lock); turn) {
+      work();
+      return true;
     }
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
-    explicit operator bool() const noexcept { return has_; }
-
-   private:
-    DriverCalls& calls_;
-    bool has_;
-  };
-
-  /// Calls `work` when nobody else calls the driver; waits up to `timeout` [s] for that.
-  /// @return false if it could not
-  bool call(double timeout, const std::function<void()>& work);
-
- private:
-  std::atomic_flag busy_;
-};
+    if (monotonic_now() >= end) return false;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+}
 
 /// Opens a device that was unplugged again, on a thread of its own that sleeps until it is asked.
 class Reopener {
  public:
-  /// @param attempt   opens the device; true if it could. Must not throw
-  /// @param interval  [s] between two attempts
-  explicit Reopener(std::function<bool()> attempt, double interval = 0.25);
+  /// @param attempt  opens the device; true if it could. Must not throw
+  explicit Reopener(std::function<bool()> attempt)
+      : attempt_(std::move(attempt)), thread_(&Reopener::run, this) {}
   /// Ends after an attempt that is under way.
-  ~Reopener();
+  ~Reopener() {
+    ending_.store(true, std::memory_order_release);
+    wakes_.call();
+    thread_.join();
+  }
 
   /// The device is gone: attempts begin. [servo]
-  void ask() noexcept;
+  void ask() noexcept {
+    if (!lost_.exchange(true, std::memory_order_acq_rel)) wakes_.call();
+  }
   /// True from `ask` until an attempt has succeeded. [servo]
   [[nodiscard]] bool is_lost() const noexcept { return lost_.load(std::memory_order_acquire); }
 
  private:
-  void run();
+  static constexpr double interval = 0.25;  // [s] between two attempts
+
+  void run() {
+    while (!ending_.load(std::memory_order_acquire)) {
+      if (!is_lost()) {
+        wakes_.wait();
+        continue;
+      }
+      wakes_.wait(interval);
+      if (!ending_.load(std::memory_order_acquire) && attempt_())
+        lost_.store(false, std::memory_order_release);
+    }
+  }
 
   std::function<bool()> attempt_;
-  double interval_;  // [s]
   std::atomic<bool> lost_{false};
-  WakeUp asked_;
-  std::mutex mutex_;  // of ending_; the servo never takes it
-  std::condition_variable wakes_;
-  bool ending_ = false;
+  std::atomic<bool> ending_{false};
+  WakeUp wakes_;  // it is lost, or all ends
   std::thread thread_;
 };
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"
 #include "palpate/io/sources/ros_frames.hpp"
 #include "palpate/io/sources/transforms.hpp"
@@ -22,6 +22,7 @@
 #include "palpate/kernel/cloud/organised.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -79,13 +80,6 @@ CameraOptions camera_options(const Uri& uri) {
   return wanted;
 }
 
-// A frame whose pose is still to come.
-struct Pending {
-  double stamp = 0.0;    // [s] since 1970
-  double arrival = 0.0;  // [s, monotonic]
-  RosFrame seen;
-};
-
 bool is_of_camera(const std::string& type) {
   return type == ros::Image::type || type == ros::CompressedImage::type ||
          type == ros::PointCloud2::type;
@@ -94,7 +88,6 @@ bool is_of_camera(const std::string& type) {
 // Asks the machine of a palpate that serves a camera what time it is.
 class RemoteClock {
  public:
-  // @param uri  of the camera, for errors
   RemoteClock(dds::Participant& participant, const std::string& camera, const std::string& uri)
       : questions_(participant, clock_question_topic(camera), ros::TimeReference{}, best_effort),
         answers_(participant, clock_answer_topic(camera), ros::TimeReference{}, best_effort),
@@ -303,14 +296,10 @@ class Camera final : public LiveCamera {
       return;
     }
     info_.clock = StampClock::monotonic;
-    clock_note_ = "; its machine's clock is known within " +
-                  milliseconds(clock_->relation().uncertainty(monotonic_now())) +
-                  " ms by questions and answers";
-  }
-  static std::string milliseconds(double seconds) {
-    std::array<char, 32> text{};
-    const int length = std::snprintf(text.data(), text.size(), "%.2f", 1e3 * seconds);
-    return {text.data(), static_cast<std::size_t>(length)};
+    clock_note_ =
+        "; its machine's clock is known within " +
+        number_text(std::ceil(1e5 * clock_->relation().uncertainty(monotonic_now())) / 100.0) +
+        " ms by questions and answers";
   }
   template <class Which>
   bool hears(const Which& which) {
@@ -380,13 +369,12 @@ class Camera final : public LiveCamera {
       const Intrinsics& k = rays_->intrinsics();
       if (k.width != static_cast<int>(seen.width) || k.height != static_cast<int>(seen.height))
         throw Error(wanted_.uri,
-                    "gives images of " + std::to_string(seen.width) + "x" +
-                        std::to_string(seen.height) + " pixels, but " + info_name_ + " says " +
-                        std::to_string(k.width) + "x" + std::to_string(k.height),
+                    "gives images of " + size_text(seen.width, seen.height) + " pixels, but " +
+                        info_name_ + " says " + size_text(k.width, k.height),
                     "name the CameraInfo that belongs to it with ?info=/TOPIC");
     }
-    const double stamp = seen.header.stamp.seconds();
-    pending_ = Pending{.stamp = stamp, .arrival = monotonic_now(), .seen = std::move(seen)};
+    arrival_ = monotonic_now();
+    pending_ = std::move(seen);
   }
 
   // In which frame points are is decided once: a pose that came later would move the whole scene.
@@ -396,10 +384,10 @@ class Camera final : public LiveCamera {
     if (decided_) return true;
     const double open_for = monotonic_now() - opened_;
     const bool settled = open_for > time_to_settle;
-    const TransformWay way = transforms_.links().way(tf_frame, "", "TF");
+    const TransformWay way = transforms_.way(tf_frame, "", "TF");
     if (!wanted_.fixed_frame.empty() && wanted_.fixed_frame != "none") {
       if (!settled && !leads(tf_frame)) return false;
-      fixed_ = transforms_.links().way(tf_frame, wanted_.fixed_frame, "TF").fixed;
+      fixed_ = transforms_.way(tf_frame, wanted_.fixed_frame, "TF").fixed;
     } else if (tf_) {
       const bool is_there = hears([](const auto& one) {
         return one.topic == transforms_topic || one.topic == static_transforms_topic;
@@ -422,21 +410,21 @@ class Camera final : public LiveCamera {
   }
   [[nodiscard]] bool leads(const std::string& tf_frame) const {
     try {
-      return !transforms_.links().way(tf_frame, wanted_.fixed_frame, "TF").fixed.empty();
+      return !transforms_.way(tf_frame, wanted_.fixed_frame, "TF").fixed.empty();
     } catch (const Error&) {
       return false;
     }
   }
 
   std::optional<Frame> frame_of_pending() {
-    if (!decide_pose(pending_->seen.header.frame_id)) return std::nullopt;
+    const auto& [stamp, tf_frame] = pending_->header;
+    if (!decide_pose(tf_frame)) return std::nullopt;
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     if (!fixed_.empty()) {
-      const TransformWay way =
-          transforms_.links().way(pending_->seen.header.frame_id, fixed_, "TF");
-      const bool late = monotonic_now() - pending_->arrival > longest_wait_for_tf;
-      if (!late && !transforms_.reach(way, pending_->stamp)) return std::nullopt;
-      const std::optional<Eigen::Isometry3d> found = transforms_.at(way, pending_->stamp);
+      const TransformWay way = transforms_.way(tf_frame, fixed_, "TF");
+      const bool late = monotonic_now() - arrival_ > longest_wait_for_tf;
+      if (!late && !transforms_.reach(way, stamp.seconds())) return std::nullopt;
+      const std::optional<Eigen::Isometry3d> found = transforms_.at(way, stamp.seconds());
       if (!found) {
         pending_.reset();
         return std::nullopt;
@@ -444,11 +432,10 @@ class Camera final : public LiveCamera {
       pose = *found;
     }
     Frame frame;
-    frame.stamp = pending_->stamp - (clock_ ? clock_->relation().difference() : 0.0);
-    frame.arrival = pending_->arrival;
-    pending_->seen.rgb.clear();  // shown of recordings alone
-    frame.cloud = cloud_of(std::move(pending_->seen), rays_, pose, organised_);
-    pending_.reset();
+    frame.stamp = stamp.seconds() - (clock_ ? clock_->relation().difference() : 0.0);
+    frame.arrival = arrival_;
+    pending_->rgb.clear();  // shown of recordings alone
+    frame.cloud = cloud_of(*std::exchange(pending_, std::nullopt), rays_, pose, organised_);
     return frame;
   }
 
@@ -463,7 +450,8 @@ class Camera final : public LiveCamera {
   std::string clock_note_;
   Transforms transforms_{kept_transforms};
   std::shared_ptr<const ViewingRays> rays_;
-  std::optional<Pending> pending_;
+  std::optional<RosFrame> pending_;  // whose pose is still to come
+  double arrival_ = 0.0;             // [s, monotonic] of it
   OrganisedClouds organised_;
   bool decided_ = false;
   std::string fixed_;  // frame of TF in which points are; empty: the camera's own

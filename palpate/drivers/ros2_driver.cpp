@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -35,9 +37,8 @@ constexpr dds::Quality force_quality{
 constexpr double needed_buffer = 4e6;   // [bytes] for depth and clouds without loss
 constexpr double listening_time = 0.5;  // [s] to hear of who publishes
 
-struct HandOptions {
-  std::string uri = {}, node = {}, pose = {}, pose_type = {}, force = {}, force_type = {},
-              button = {};
+struct HandOptions : Ros2Hand {
+  std::string uri = {};
   Eigen::Matrix3d device_from_topic = Eigen::Matrix3d::Identity();
   double max_force = 3.3;  // [N]
   double silence = 0.06;   // [s] without a pose: no hand
@@ -67,50 +68,37 @@ Eigen::Matrix3d axes_of(const std::string& text, const std::string& uri) {
   return axes;
 }
 
-std::string with_name(std::string_view topic, const std::string& name) {
-  std::string text(topic);
-  if (const std::size_t at = text.find("NAME"); at != std::string::npos) text.replace(at, 4, name);
-  return text;
-}
-
 HandOptions hand_options(const Uri& uri) {
   uri.allow_only(
       std::to_array<std::string_view>({"name", "pose", "pose_type", "force", "force_type", "button",
                                        "axes", "max_force", "silence", "wait"}));
-  Ros2Hand hand{.name = "",
-                .node = "a node of its own",
-                .pose = "",
-                .pose_type = "PoseStamped",
-                .force = "",
-                .force_type = "WrenchStamped",
-                .button = "",
-                .axes = "x,y,z"};
-  if (!uri.path().empty()) {
-    std::string names;
-    bool found = false;
-    for (const Ros2Hand& one : ros2_hands()) {
-      add_to_list(names, "ros2:" + std::string(one.name));
-      if (one.name != uri.path()) continue;
-      hand = one;
-      found = true;
-    }
-    if (!found)
-      throw Error(uri.text(), "no haptic node is known as '" + uri.path() + "'",
-                  "write " + names + ", or ros2:?pose=/TOPIC&force=/TOPIC");
+  HandOptions wanted;
+  wanted.uri = uri.text();
+  std::string names;
+  for (const Ros2Hand& one : ros2_hands()) {
+    add_to_list(names, "ros2:" + one.name);
+    if (one.name == uri.path()) static_cast<Ros2Hand&>(wanted) = one;
   }
-  HandOptions wanted{.uri = uri.text(), .node = std::string(hand.node)};
+  if (wanted.name != uri.path())
+    throw Error(uri.text(), "no haptic node is known as '" + uri.path() + "'",
+                "write " + names + ", or ros2:?pose=/TOPIC&force=/TOPIC");
   const std::string name = uri.text_option("name", "arm");
-  wanted.pose = uri.text_option("pose", with_name(hand.pose, name));
-  wanted.force = uri.text_option("force", with_name(hand.force, name));
-  wanted.button = uri.text_option("button", with_name(hand.button, name));
-  wanted.pose_type = uri.text_option("pose_type", hand.pose_type);
-  wanted.force_type = uri.text_option("force_type", hand.force_type);
+  const auto topic_option = [&](std::string_view key, std::string& topic) {
+    if (const std::size_t at = topic.find("NAME"); at != std::string::npos)
+      topic.replace(at, 4, name);
+    topic = uri.text_option(key, topic);
+  };
+  topic_option("pose", wanted.pose);
+  topic_option("force", wanted.force);
+  topic_option("button", wanted.button);
+  wanted.pose_type = uri.text_option("pose_type", wanted.pose_type);
+  wanted.force_type = uri.text_option("force_type", wanted.force_type);
   for (const std::string* topic : {&wanted.pose, &wanted.force}) {
     if (topic->size() < 2 || topic->front() != '/')
       throw Error(uri.text(), "names no topic for the pose, or none for the force",
                   "write ros2:?pose=/TOPIC&force=/TOPIC, or the name of a node: ros2:fd");
   }
-  wanted.device_from_topic = axes_of(uri.text_option("axes", hand.axes), uri.text());
+  wanted.device_from_topic = axes_of(uri.text_option("axes", wanted.axes), uri.text());
   wanted.max_force = uri.number_option("max_force", wanted.max_force, 0.1, 20.0, "N");
   wanted.silence = uri.number_option("silence", wanted.silence, 0.005, 1.0, "s");
   wanted.patience = uri.number_option("wait", wanted.patience, 0.1, 25.0, "s");
@@ -119,49 +107,37 @@ HandOptions hand_options(const Uri& uri) {
 
 using Xyz = std::array<double, 3>;
 
-// A type of message in which a node takes forces.
-struct ForceKind {
-  std::string_view name;
-  std::unique_ptr<dds::Writer> (*make)(dds::Participant&, const std::string& topic,
-                                       const dds::Quality&);
-  void (*write)(dds::Writer&, const Xyz& force);
+// Where a node takes forces, and what sends one there as the type of message that it wants.
+struct ForceTopic {
+  std::unique_ptr<dds::Writer> writer = {};
+  std::function<void(const Xyz& force)> send = {};
 };
 
-template <class MessageOf>
-constexpr ForceKind force_kind(std::string_view name, MessageOf /*a lambda without captures*/) {
-  return {name,
-          [](dds::Participant& participant, const std::string& topic, const dds::Quality& quality) {
-            return std::make_unique<dds::Writer>(participant, topic, MessageOf{}(Xyz{}), quality);
-          },
-          [](dds::Writer& writer, const Xyz& force) { writer.write(MessageOf{}(force)); }};
-}
-
-constexpr std::array force_kinds{
-    force_kind("WrenchStamped",
-               [](const Xyz& force) {
-                 return ros::WrenchStamped{{ros::Time::now(), ""}, force, {}};
-               }),
-    force_kind("Wrench",
-               [](const Xyz& force) {
-                 return ros::Wrench{force, {}};
-               }),
-    force_kind("Vector3", [](const Xyz& force) { return ros::Vector3{force}; }),
-    force_kind("Float64MultiArray",
-               [](const Xyz& force) {
-                 return ros::Float64MultiArray{"", {force.begin(), force.end()}};
-               }),
-    force_kind("OmniFeedback", [](const Xyz& force) {
-      return ros::OmniFeedback{force, {}};
-    })};
-
-const ForceKind& force_kind_of(const HandOptions& wanted) {
+ForceTopic force_topic(dds::Participant& participant, const HandOptions& wanted) {
+  ForceTopic topic;
   std::string names;
-  for (const ForceKind& kind : force_kinds) {
-    if (kind.name == wanted.force_type) return kind;
-    add_to_list(names, kind.name);
-  }
-  throw Error(wanted.uri, "force_type=" + wanted.force_type + " is not known",
-              "there are: " + names);
+  const auto type = [&](std::string_view name, auto message_of) {
+    add_to_list(names, name);
+    if (name != wanted.force_type) return;
+    topic.writer =
+        std::make_unique<dds::Writer>(participant, wanted.force, message_of(Xyz{}), force_quality);
+    topic.send = [writer = topic.writer.get(), message_of](const Xyz& force) {
+      writer->write(message_of(force));
+    };
+  };
+  type("WrenchStamped", [](const Xyz& force) {
+    return ros::WrenchStamped{{ros::Time::now(), ""}, force, {}};
+  });
+  type("Wrench", [](const Xyz& force) { return ros::Wrench{force, {}}; });
+  type("Vector3", [](const Xyz& force) { return ros::Vector3{force}; });
+  type("Float64MultiArray", [](const Xyz& force) {
+    return ros::Float64MultiArray{"", {force.begin(), force.end()}};
+  });
+  type("OmniFeedback", [](const Xyz& force) { return ros::OmniFeedback{force, {}}; });
+  if (topic.writer == nullptr)
+    throw Error(wanted.uri, "force_type=" + wanted.force_type + " is not known",
+                "there are: " + names);
+  return topic;
 }
 
 class Hand final : public ChannelHand {
@@ -170,8 +146,7 @@ class Hand final : public ChannelHand {
       : ChannelHand(wanted.silence),
         wanted_(std::move(wanted)),
         participant_(wanted_.uri),
-        force_kind_(force_kind_of(wanted_)),
-        forces_out_(force_kind_.make(participant_, wanted_.force, force_quality)) {
+        forces_out_(force_topic(participant_, wanted_)) {
     info_.uri = wanted_.uri;
     info_.kind = "ROS 2, " + wanted_.node;
     info_.limits.max_force = wanted_.max_force;
@@ -209,7 +184,7 @@ class Hand final : public ChannelHand {
       participant_.wait(0.01);
       hear();
       const bool is_told = newest_.time > 0.0;
-      const bool is_taken = forces_out_->readers() > 0;
+      const bool is_taken = forces_out_.writer->readers() > 0;
       if (is_told && is_taken) return;
       if (monotonic_now() < end) continue;
       const std::string where = " in domain " + std::to_string(participant_.domain());
@@ -239,7 +214,7 @@ class Hand final : public ChannelHand {
         any = place(pose->position) || any;
       }
     } else {
-      while (const auto point = points_->take_whole<ros::Point>()) any = place(point->xyz) || any;
+      while (const auto point = points_->take_whole<ros::Point>()) any = place(point->data) || any;
     }
     if (any) seen_.put(newest_);
     silent_.store(monotonic_now() - newest_.time > wanted_.silence, std::memory_order_release);
@@ -270,17 +245,16 @@ class Hand final : public ChannelHand {
       send(Vec3::Zero());
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    forces_out_->wait_for_readers(last_wait);
+    forces_out_.writer->wait_for_readers(last_wait);
   }
   void send(const Vec3& force_in_device) {
     const Vec3 force = wanted_.device_from_topic.transpose() * force_in_device;
-    force_kind_.write(*forces_out_, {force.x(), force.y(), force.z()});
+    forces_out_.send({force.x(), force.y(), force.z()});
   }
 
   const HandOptions wanted_;
   dds::Participant participant_;
-  const ForceKind& force_kind_;
-  std::unique_ptr<dds::Writer> forces_out_;
+  ForceTopic forces_out_;
   std::optional<dds::Reader> poses_, points_, buttons_;
   std::atomic<bool> silent_{false};
   Seen newest_;  // of the listener's thread
@@ -331,8 +305,6 @@ std::unique_ptr<Device> open_ros2_device(const Uri& uri) {
   return std::make_unique<ros2::Hand>(ros2::hand_options(uri));
 }
 
-/// `ros2:/TOPIC` as a camera and `ros2:PRESET` as a device: topics of ROS 2 on the network, without
-/// ROS (docs/ros.md).
 Driver ros2_driver() {
   return {.name = "ros2",
           .summary =

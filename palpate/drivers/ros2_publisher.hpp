@@ -19,8 +19,7 @@ namespace palpate {
 /// clock and the question's own time and source.
 std::string clock_question_topic(const std::string& camera);
 std::string clock_answer_topic(const std::string& camera);
-/// Where those that read slices say how they come: Float64MultiArray with what SendRate::report
-/// takes.
+/// Where readers of slices say how they come: Float64MultiArray of what SendRate::report takes.
 std::string report_topic(const std::string& camera);
 
 /// Publishes depth images as a camera of ROS 2: /NAME/depth/image_raw/compressedDepth (to the bit),
@@ -28,9 +27,8 @@ std::string report_topic(const std::string& camera);
 /// millimetre, as ROS takes for granted, the messages' format says so (compressed_depth).
 ///
 /// The same images are on /NAME/depth/image_raw/slices as slices (depth_rvl.hpp), for links that
-/// lose packets: best effort, and no more images a second than the link carries. Only what
-/// somebody reads is packed. A thread of its own answers what the time is here, and hears how
-/// slices come.
+/// lose packets: best effort, and no more images a second than the link carries. Only what somebody
+/// reads is packed. A thread of its own tells the time, and hears how slices come.
 class Ros2CameraPublisher {
  public:
   /// @throws Error if `name` is not a valid topic name, or DDS is missing.
@@ -53,7 +51,7 @@ class Ros2CameraPublisher {
   std::string name_;
   DepthPacking packing_;
   dds::Participant participant_;
-  std::string topic_, slices_topic_;
+  std::string camera_, topic_, slices_topic_;
   // Others hear of them in this order: whoever has heard of the images has heard of all.
   dds::Reader questions_;
   dds::Writer answers_;

@@ -11,8 +11,7 @@ namespace palpate {
 struct LibraryNames {
   std::string name;                ///< as people call it: "Force Dimension SDK"
   std::vector<std::string> files;  ///< tried in this order: names for the loader, or paths
-  /// Variable of the environment. Where it is set it counts alone: a file, or the folder of one of
-  /// `files`.
+  /// Of the environment. Where it is set it counts alone: a file, or the folder of one of `files`.
   std::string variable;
   std::string remedy;  ///< what to install: "install the SDK from www.forcedimension.com"
 };

@@ -90,10 +90,9 @@ class Puck final : public Sticks {
 };
 
 std::unique_ptr<Device> open_puck(const Uri& uri) {
-  uri.allow_only(rate_option_names);
+  const RateOptions options = rate_options(uri);
   if (!uri.path().empty())
     throw Error(uri.text(), "spacenav: has no '" + uri.path() + "'", "write spacenav: alone");
-  const RateOptions options = rate_options(uri);
   DeviceInfo info{.uri = uri.text(), .kind = "SpaceMouse by libspnav", .limits = no_motors};
   return std::make_unique<RateHand>(std::make_unique<Puck>(uri.text()), info, options);
 }
@@ -114,8 +113,6 @@ DriverReport look() {
 }  // namespace
 }  // namespace spacenav
 
-/// 3Dconnexion's SpaceMouse and the like, by libspnav and its daemon spacenavd: `spacenav:`. It
-/// moves the hand by rate control and gives no force.
 Driver spacenav_driver() {
   return {.name = "spacenav",
           .summary = "a SpaceMouse by spacenavd: moves the hand, gives no force",

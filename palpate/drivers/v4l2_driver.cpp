@@ -21,6 +21,7 @@
 
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
+#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/intrinsics_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -41,7 +42,6 @@ std::string remedy() {
          "depth";
 }
 
-// A video node; closed with the object.
 class Node {
  public:
   explicit Node(const std::string& path)
@@ -105,27 +105,11 @@ DriverReport look() {
 }
 
 // One of the kernel's buffers, seen from here.
-class Mapping {
- public:
-  Mapping(const Node& node, std::size_t size, std::uint32_t offset)
-      : size_(size),
-        data_(::mmap(nullptr, size, PROT_READ, MAP_SHARED, node.file(),
-                     static_cast<off_t>(offset))) {}
-  ~Mapping() {
-    if (is_there()) ::munmap(data_, size_);
-  }
-  Mapping(Mapping&& other) noexcept
-      : size_(other.size_), data_(std::exchange(other.data_, MAP_FAILED)) {}
-  Mapping& operator=(Mapping&&) = delete;
-
-  [[nodiscard]] bool is_there() const { return data_ != MAP_FAILED; }
-  [[nodiscard]] const void* data() const { return data_; }
-  [[nodiscard]] std::size_t size() const { return size_; }
-
- private:
-  std::size_t size_;
-  void* data_;
+struct Unmap {
+  std::size_t size;
+  void operator()(void* data) const noexcept { ::munmap(data, size); }
 };
+using Mapping = std::unique_ptr<void, Unmap>;
 
 class Camera final : public LiveCamera {
  public:
@@ -185,9 +169,8 @@ class Camera final : public LiveCamera {
     if (wanted.width != static_cast<std::uint32_t>(k.width) ||
         wanted.height != static_cast<std::uint32_t>(k.height))
       throw Error(info_.uri,
-                  "it gives " + std::to_string(wanted.width) + "x" + std::to_string(wanted.height) +
-                      " pixels, but its intrinsics are for " + std::to_string(k.width) + "x" +
-                      std::to_string(k.height),
+                  "it gives " + size_text(wanted.width, wanted.height) +
+                      " pixels, but its intrinsics are for " + size_text(k.width, k.height),
                   "give the intrinsics of a size that it has; v4l2-ctl --list-formats-ext");
     stride_ = std::max<std::size_t>(wanted.bytesperline, 2 * std::size_t{wanted.width});
     needed_ = stride_ * (wanted.height - 1) + 2 * std::size_t{wanted.width};
@@ -221,9 +204,11 @@ class Camera final : public LiveCamera {
     for (std::uint32_t i = 0; i < request.count; ++i) {
       v4l2_buffer each = buffer(i);
       if (!node_.control(VIDIOC_QUERYBUF, each)) fail("it does not show its buffers");
-      mappings_.emplace_back(node_, each.length, each.m.offset);
-      if (!mappings_.back().is_there()) fail("its buffers cannot be mapped");
-      if (mappings_.back().size() < needed_)
+      void* const data = ::mmap(nullptr, each.length, PROT_READ, MAP_SHARED, node_.file(),
+                                static_cast<off_t>(each.m.offset));
+      if (data == MAP_FAILED) fail("its buffers cannot be mapped");
+      mappings_.emplace_back(data, Unmap{each.length});
+      if (each.length < needed_)
         throw Error(info_.uri, "its buffers are smaller than its images", "update its driver");
       if (!node_.control(VIDIOC_QBUF, each)) fail("it does not take its buffers");
     }
@@ -251,7 +236,7 @@ class Camera final : public LiveCamera {
   Frame frame_of(const v4l2_buffer& filled) {
     const Intrinsics& k = lens_.intrinsics;
     std::vector<std::uint16_t> depth =
-        depth_rows(mappings_[filled.index].data(), k.width, k.height, stride_, info_.uri);
+        depth_rows(mappings_[filled.index].get(), k.width, k.height, stride_, info_.uri);
     for (std::uint16_t& raw : depth) {
       if (raw == lens_.invalid_value || raw == lens_.saturated_value) raw = 0;
     }
@@ -275,12 +260,8 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
-/// `v4l2:/dev/videoN?intrinsics=FILE.json`, a depth camera that the kernel itself drives: a node
-/// that gives Z16, as the RealSense D400 series does.
-///
-/// V4L2 tells neither lens nor unit: FILE.json does (intrinsics_file.hpp), and its size is the one
-/// that is asked for. Option `fps` [Hz]. Stamps are the kernel's, on StampClock::monotonic, as all
-/// drivers of cameras in it have them: when a frame's first or last bytes arrived.
+/// docs/cameras.md describes it. Stamps are the kernel's, as all drivers of cameras in it have
+/// them: when a frame's first or last bytes arrived.
 Driver v4l2_driver() {
   return {.name = "v4l2",
           .summary = "v4l2:/dev/videoN?intrinsics=FILE.json, depth as Z16 by the kernel",

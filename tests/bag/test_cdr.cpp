@@ -24,10 +24,7 @@ std::vector<std::byte> bytes_of(std::initializer_list<int> values) {
 
 TEST(Cdr, LiesInMemoryAsTheStandardSays) {
   CdrWriter writer;
-  writer.put(std::uint8_t{7});
-  writer.put(std::uint32_t{0x01020304});
-  writer.put_string("ab");
-  writer.put(1.0);
+  writer(std::uint8_t{7}, std::uint32_t{0x01020304}, std::string("ab"), 1.0);
   // Header; 7 and three to the next multiple of 4; the number; length 3, "ab", NUL and one to the
   // next multiple of 8 behind 15; the double.
   EXPECT_EQ(writer.take(), bytes_of({0, 1, 0,   0,   7, 0, 0, 0, 4, 3, 2, 1, 3,    0,
@@ -37,17 +34,22 @@ TEST(Cdr, LiesInMemoryAsTheStandardSays) {
 TEST(Cdr, ReadsBigEndianToo) {
   const auto bytes = bytes_of({0, 0, 0, 0, 7, 0, 0, 0, 1, 2, 3, 4, 0, 0, 0, 3, 'a', 'b', 0});
   CdrReader reader(bytes, "message");
-  EXPECT_EQ(reader.get<std::uint8_t>(), 7);
-  EXPECT_EQ(reader.get<std::uint32_t>(), 0x01020304U);
-  EXPECT_EQ(reader.get_string(), "ab");
-  EXPECT_TRUE(fails_saying([&] { return reader.get<std::uint8_t>(); }, "message", "too early"));
+  std::uint8_t small = 0;
+  std::uint32_t large = 0;
+  std::string text;
+  reader(small, large, text);
+  EXPECT_EQ(small, 7);
+  EXPECT_EQ(large, 0x01020304U);
+  EXPECT_EQ(text, "ab");
+  EXPECT_TRUE(fails_saying([&] { reader(small); }, "message", "too early"));
 }
 
 TEST(Cdr, RefusesWhatPromisesMoreThanItHolds) {
   const auto bytes = bytes_of({0, 1, 0, 0, 0xff, 0xff, 0xff, 0xff, 1, 2, 3, 4});
-  EXPECT_TRUE(fails_saying([&] { return CdrReader(bytes, "it").get_sequence<double>(); }, "it",
-                           "4294967295"));
-  EXPECT_TRUE(fails_saying([&] { return CdrReader(bytes, "it").get_string(); }, "it"));
+  std::vector<double> numbers;
+  std::string text;
+  EXPECT_TRUE(fails_saying([&] { CdrReader(bytes, "it")(numbers); }, "it", "4294967295"));
+  EXPECT_TRUE(fails_saying([&] { CdrReader(bytes, "it")(text); }, "it"));
 }
 
 TEST(Cdr, NamesOtherRepresentations) {

@@ -15,7 +15,6 @@
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/source.hpp"
-#include "palpate/io/sources/splat_body.hpp"
 #include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/session/frame_sequence.hpp"

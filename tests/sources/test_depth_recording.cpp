@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/sources/depth_png.hpp"
-#include "palpate/io/sources/depth_recording.hpp"
+#include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 
 #include "tests/support/depth_pngs.hpp"
@@ -27,7 +27,7 @@ constexpr const char* small_camera =
 void write_flat(const std::filesystem::path& file, std::uint16_t raw, int width = 4,
                 int height = 3) {
   const auto size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  write_depth_png(file, width, height, std::vector<std::uint16_t>(size, raw));
+  test::write_depth_png(file, width, height, std::vector<std::uint16_t>(size, raw));
 }
 
 const DepthImage& image_of(const std::optional<Frame>& frame) {
@@ -303,8 +303,8 @@ TEST(DepthFolder, TakesRecordedNoValuesForHoles) {
   const TemporaryFolder folder;
   folder.write("intrinsics.json",
                R"({"invalid_value": 7, "saturated_value": 9,)" + std::string(small_camera + 1));
-  write_depth_png(folder.path() / "0.png", 4, 3,
-                  std::vector<std::uint16_t>{0, 7, 9, 65535, 8, 8, 8, 8, 8, 8, 8, 8});
+  test::write_depth_png(folder.path() / "0.png", 4, 3,
+                        std::vector<std::uint16_t>{0, 7, 9, 65535, 8, 8, 8, 8, 8, 8, 8, 8});
   const auto frame = open_source("depth:" + folder.path().string())->next();
   EXPECT_EQ(image_of(frame).points().size(), 8u);
   EXPECT_FALSE(image_of(frame).deproject(1, 0));

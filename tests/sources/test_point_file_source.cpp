@@ -8,7 +8,6 @@
 
 #include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
-#include "palpate/io/sources/point_file_source.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"

@@ -301,15 +301,15 @@ TEST(RealSenseLens, IsReadFromItsText) {
       "width=848;height=480;fx=422.038;ppx=422.79;fy=423;ppy=236.05;model=Brown Conrady;"
       "coeffs=0.1,-0.2,1e-3,0,5",
       "it");
-  EXPECT_EQ(read.width, 848);
-  EXPECT_EQ(read.ppy, 236.05);
+  EXPECT_EQ(read.pinhole.width, 848);
+  EXPECT_EQ(read.pinhole.cy, 236.05);
   EXPECT_EQ(intrinsics_of(read, "it").distortion,
             (std::array<double, 8>{0.1, -0.2, 1e-3, 0, 5, 0, 0, 0}));
 }
 
 TEST(RealSenseLens, OfAModelWithoutAnEqualIsRefusedUnlessItIsZero) {
-  RealSenseLens inverse{
-      .width = 4, .height = 3, .fx = 1, .fy = 1, .model = "Inverse Brown Conrady"};
+  RealSenseLens inverse{.pinhole = {.width = 4, .height = 3, .fx = 1, .fy = 1},
+                        .model = "Inverse Brown Conrady"};
   EXPECT_FALSE(intrinsics_of(inverse, "it").distorted());
   inverse.coeffs[1] = 0.1;
   EXPECT_TRUE(fails_saying([&] { return intrinsics_of(inverse, "it"); }, "it", "Inverse Brown"));

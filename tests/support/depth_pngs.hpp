@@ -4,9 +4,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "palpate/io/sources/depth_png.hpp"
 
 namespace palpate::test {
 
@@ -55,6 +60,15 @@ inline std::string png_of(std::uint32_t width, std::uint32_t height, char bits, 
   return "\x89PNG\r\n\x1a\n" + chunk("IHDR", header) +
          (colour == palette ? chunk("PLTE", "abcdef") : "") + chunk("IDAT", deflated) +
          chunk("IEND", "");
+}
+
+/// Writes depth as the library packs it.
+inline void write_depth_png(const std::filesystem::path& path, int width, int height,
+                            std::span<const std::uint16_t> depth) {
+  const std::vector<std::byte> bytes = encode_depth_png(width, height, depth);
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
 }
 
 }  // namespace palpate::test

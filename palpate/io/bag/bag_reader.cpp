@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <utility>
+#include <set>
 
 #include "palpate/io/bag/compression.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -35,28 +35,23 @@ std::vector<fs::path> files_of(const fs::path& path) {
     return {path};
   }
   std::vector<fs::path> files;
-  bool sqlite = false;
-  bool mcap = false;
-  bool compressed = false;
-  bool ros1 = false;
+  std::set<fs::path> endings;
   for (auto entry = fs::directory_iterator(path, error); !error && entry != fs::end(entry);
        entry.increment(error)) {
     const fs::path extension = entry->path().extension();
     if (extension == ".db3" || extension == ".mcap") files.push_back(entry->path());
-    sqlite = sqlite || extension == ".db3";
-    mcap = mcap || extension == ".mcap";
-    compressed = compressed || extension == ".zstd";
-    ros1 = ros1 || extension == ".bag";
+    endings.insert(extension);
   }
   if (error) throw Error(path.string(), "cannot be listed: " + error.message(), "check the path");
   if (files.empty()) {
-    if (compressed)
+    if (endings.contains(".zstd"))
       throw Error(path.string(), "is a compressed bag",
                   "decompress its files with zstd -d, or the bag with ros2 bag convert");
-    if (ros1) throw Error(path.string(), "holds bags of ROS 1", "name one of its .bag files");
+    if (endings.contains(".bag"))
+      throw Error(path.string(), "holds bags of ROS 1", "name one of its .bag files");
     throw Error(path.string(), "holds no .db3 or .mcap file", "name the folder of a ROS 2 bag");
   }
-  if (sqlite && mcap)
+  if (endings.contains(".db3") && endings.contains(".mcap"))
     throw Error(path.string(), "holds .db3 and .mcap files, so more than one bag",
                 "name one of the files");
   std::sort(files.begin(), files.end(),

@@ -46,8 +46,7 @@ class BagFile {
   [[nodiscard]] virtual std::string_view kind() const { return "ROS 2 bag"; }
   /// In the order of the file; a name may come more than once.
   [[nodiscard]] virtual std::vector<BagTopic> topics() const = 0;
-  /// Those of a topic, in the order in which they were written; none of an unknown one. @throws
-  /// Error
+  /// Those of a topic in the order in which they were written, if any. @throws Error
   [[nodiscard]] virtual std::vector<Message> messages(std::string_view topic) = 0;
   /// @throws Error if it cannot be read, or is not what its checksum says.
   [[nodiscard]] virtual Content read(std::int64_t id) = 0;
@@ -84,10 +83,8 @@ std::unique_ptr<BagFile> open_ros1_file(const std::filesystem::path& file);
 /// Any of them, by how the file begins and what its name ends with. @throws Error
 std::unique_ptr<BagFile> open_bag_file(const std::filesystem::path& file);
 
-/// Reads the messages of a ROS 2 bag whose storage is SQLite or MCAP, or of a bag of ROS 1.
-///
-/// metadata.yaml is not looked at: what it says of a bag whose program was killed is out of date.
-/// Used on one thread.
+/// Reads the messages of a ROS 2 bag whose storage is SQLite or MCAP, or of a bag of ROS 1, but not
+/// metadata.yaml, which is out of date where a program was killed. Used on one thread.
 class BagReader {
  public:
   /// @param path  the bag's folder, or one .db3, .mcap or .bag file
@@ -112,8 +109,7 @@ class BagReader {
   /// MESSAGE) can write it, is decompressed.
   /// @throws Error if it cannot be read, or is not what its checksum says.
   [[nodiscard]] std::vector<std::byte> read(const Place& place);
-  /// Reads everything and compares it with the checksums: about 1 s a gigabyte. Throws nothing for
-  /// damage.
+  /// Reads all and compares it with the checksums: about 1 s a gigabyte. Throws nothing for damage.
   [[nodiscard]] BagCheck check();
   /// What errors call the message.
   [[nodiscard]] std::string name(std::string_view topic, const Place& place) const;

@@ -17,10 +17,8 @@ namespace palpate {
 
 /// Writes a bag as ROS 2's rosbag2 does: a folder with metadata.yaml (version 7) and one file of
 /// MCAP, in chunks that are compressed with zstd and have checksums. Images and points are in
-/// chunks of their own, so that nobody has to unpack them for what lies between.
-///
-/// What was committed stays readable whatever happens to the program: the file only grows, by whole
-/// chunks. Used on one thread.
+/// chunks of their own, so that nobody has to unpack them for what lies between. What was committed
+/// stays readable whatever happens: the file only grows, by whole chunks. Used on one thread.
 class BagWriter {
  public:
   /// @param folder  of the bag; must not be there yet
@@ -38,8 +36,7 @@ class BagWriter {
   /// @throws Error if the disk is full or fails. What was committed before stays; nothing more can
   ///         be written.
   void write(std::size_t topic, std::int64_t nanoseconds, std::span<const std::byte> message);
-  /// Makes what was written so far last, the images before the rest, and metadata.yaml say how much
-  /// that is. Throws as `write`.
+  /// Makes what was written so far last, and says so in metadata.yaml. Throws as `write`.
   void commit();
   /// Commits and ends the file with its index. Throws as `write`.
   void close();

@@ -41,19 +41,18 @@ std::span<const std::byte> CdrReader::take(std::size_t count) {
   return body_.subspan(at_ - count, count);
 }
 
-std::size_t CdrReader::get_count(std::size_t size) {
-  const std::size_t count = get<std::uint32_t>();
+std::size_t CdrReader::count(std::size_t size) {
+  const std::size_t count = number<std::uint32_t>();
   if (count > (body_.size() - at_) / size)
     throw Error(name_, "promises " + std::to_string(count) + " elements, more than it can hold",
                 "it is damaged, or not of the type that its topic says");
   return count;
 }
 
-std::string CdrReader::get_string() {
-  const std::span<const std::byte> bytes = get_bytes();  // the NUL behind it included
-  std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+void CdrReader::get(std::string& text) {
+  const std::span<const std::byte> bytes = take(count(1));  // the NUL behind it included
+  text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!text.empty() && text.back() == '\0') text.pop_back();
-  return text;
 }
 
 }  // namespace palpate

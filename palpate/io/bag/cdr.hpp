@@ -9,15 +9,13 @@
 #include <cstring>
 #include <span>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace palpate {
 
-/// A message, or what one consists of: hands its fields to `way`, all at once and in the order of
-/// its definition.
+/// A message, or what one consists of: hands all its fields to `way`, in the order of ROS.
 template <class T>
 concept Walkable = requires(int& way, const T& message) {
   T::walk(way, message);
@@ -33,36 +31,10 @@ class CdrWriter {
  public:
   CdrWriter() : bytes_{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}} {}
 
-  template <class T>
-  void put(T value) {
-    static_assert(std::is_arithmetic_v<T>);
-    align(sizeof(T));
-    append(&value, 1);
-  }
-  template <class T>
-  void put_array(std::span<const T> values) {
-    static_assert(Plain<T>);
-    if (values.empty()) return;
-    align(sizeof(T));
-    append(values.data(), values.size());
-  }
-  /// A sequence: how many, then the elements.
-  template <class T>
-  void put_sequence(std::span<const T> values) {
-    put(static_cast<std::uint32_t>(values.size()));
-    put_array(values);
-  }
-  /// Without a NUL within; one is put behind it.
-  void put_string(std::string_view text) {
-    put(static_cast<std::uint32_t>(text.size() + 1));
-    append(text.data(), text.size());
-    bytes_.push_back(std::byte{0});
-  }
-
   /// The fields of a message, in this order.
   template <class... Fields>
   void operator()(const Fields&... fields) {
-    (put_field(fields), ...);
+    (put(fields), ...);
   }
   void begin_header() {}
 
@@ -72,37 +44,37 @@ class CdrWriter {
   static constexpr std::size_t header = 4;
 
   template <class T>
-  void put_field(const T& value) {
+  void put(const T& value) {
     if constexpr (Walkable<T>)
       T::walk(*this, value);
     else
-      put(value);
+      put_all(&value, 1);
   }
-  void put_field(const std::string& text) { put_string(text); }
+  void put(const std::string& text) {  // and a NUL behind it
+    put(static_cast<std::uint32_t>(text.size() + 1));
+    put_all(text.c_str(), text.size() + 1);
+  }
   template <class T, std::size_t n>
-  void put_field(const std::array<T, n>& values) {
-    put_array(std::span<const T>(values));
+  void put(const std::array<T, n>& values) {
+    put_all(values.data(), n);
   }
   template <class T>
-  void put_field(const std::vector<T>& values) {
-    if constexpr (Plain<T>) {
-      put_sequence(std::span(values));
-    } else {
-      put(static_cast<std::uint32_t>(values.size()));
-      for (const T& value : values) put_field(value);
-    }
+  void put(const std::vector<T>& values) {
+    put(static_cast<std::uint32_t>(values.size()));
+    if constexpr (Plain<T>)
+      put_all(values.data(), values.size());
+    else
+      for (const T& value : values) put(value);
   }
 
-  void align(std::size_t size) {
-    const std::size_t past = (bytes_.size() - header) % size;
-    if (past != 0) bytes_.resize(bytes_.size() + size - past);
-  }
-  template <class T>
-  void append(const T* values, std::size_t count) {
+  template <Plain T>
+  void put_all(const T* values, std::size_t count) {
     static_assert(std::endian::native == std::endian::little, "CDR is written as it lies in RAM");
-    const std::size_t at = bytes_.size();
+    if (count == 0) return;
+    const std::size_t past = (bytes_.size() - header) % sizeof(T);
+    const std::size_t at = bytes_.size() + (past == 0 ? 0 : sizeof(T) - past);
     bytes_.resize(at + count * sizeof(T));
-    if (count > 0) std::memcpy(bytes_.data() + at, values, count * sizeof(T));
+    std::memcpy(bytes_.data() + at, values, count * sizeof(T));
   }
 
   std::vector<std::byte> bytes_;
@@ -120,9 +92,46 @@ class CdrReader {
   /// @throws Error if it is not plain CDR.
   CdrReader(std::span<const std::byte> message, std::string name, Layout layout = Layout::cdr);
 
-  /// @throws Error if the message ends before.
+  /// The fields of a message, in this order. @throws Error if the message ends before.
+  template <class... Fields>
+  void operator()(Fields&... fields) {
+    (get(fields), ...);
+  }
+  /// A header of ROS 1 begins with a number that ROS 2 has no more.
+  void begin_header() {
+    if (layout_ == Layout::ros1) static_cast<void>(number<std::uint32_t>());
+  }
+
+ private:
   template <class T>
-  T get() {
+  void get(T& value) {
+    if constexpr (Walkable<T>)
+      T::walk(*this, value);
+    else
+      value = number<T>();
+  }
+  void get(bool& value) { value = number<std::uint8_t>() != 0; }
+  void get(std::string& text);
+  template <class T, std::size_t n>
+  void get(std::array<T, n>& values) {
+    for (T& value : values) get(value);
+  }
+  template <class T>
+  void get(std::vector<T>& values) {
+    values.clear();
+    if constexpr (std::is_same_v<T, std::byte>) {
+      const std::span<const std::byte> bytes = take(count(1));
+      values.assign(bytes.begin(), bytes.end());
+    } else if constexpr (Plain<T>) {
+      values.resize(count(sizeof(T)));
+      for (T& value : values) value = number<T>();
+    } else {  // grows with what is there: none is as short as what is asked for
+      for (std::size_t left = count(1); left > 0; --left) get(values.emplace_back());
+    }
+  }
+
+  template <class T>
+  T number() {
     static_assert(std::is_arithmetic_v<T>);
     align(sizeof(T));
     const std::span<const std::byte> bytes = take(sizeof(T));
@@ -131,55 +140,8 @@ class CdrReader {
     if (swapped_) std::reverse(ordered.begin(), ordered.end());
     return std::bit_cast<T>(ordered);
   }
-  template <class T>
-  std::vector<T> get_sequence() {
-    std::vector<T> values(get_count(sizeof(T)));
-    for (T& value : values) value = get<T>();
-    return values;
-  }
-  /// A sequence of bytes, as it lies in the message.
-  std::span<const std::byte> get_bytes() { return take(get_count(1)); }
-  std::string get_string();
-  /// How many elements of at least `size` bytes follow.
-  std::size_t get_count(std::size_t size);
-
-  /// The fields of a message, in this order.
-  template <class... Fields>
-  void operator()(Fields&... fields) {
-    (get_field(fields), ...);
-  }
-  /// A header of ROS 1 begins with a number that ROS 2 has no more.
-  void begin_header() {
-    if (layout_ == Layout::ros1) static_cast<void>(get<std::uint32_t>());
-  }
-
- private:
-  template <class T>
-  void get_field(T& value) {
-    if constexpr (Walkable<T>)
-      T::walk(*this, value);
-    else
-      value = get<T>();
-  }
-  void get_field(bool& value) { value = get<std::uint8_t>() != 0; }
-  void get_field(std::string& text) { text = get_string(); }
-  template <class T, std::size_t n>
-  void get_field(std::array<T, n>& values) {
-    for (T& value : values) get_field(value);
-  }
-  template <class T>
-  void get_field(std::vector<T>& values) {
-    values.clear();
-    if constexpr (std::is_same_v<T, std::byte>) {
-      const std::span<const std::byte> bytes = get_bytes();
-      values.assign(bytes.begin(), bytes.end());
-    } else if constexpr (Plain<T>) {
-      values = get_sequence<T>();
-    } else {  // grows with what is there: none is as short as what is asked for
-      for (std::size_t left = get_count(1); left > 0; --left) get_field(values.emplace_back());
-    }
-  }
-
+  // How many elements of at least `size` bytes follow.
+  std::size_t count(std::size_t size);
   void align(std::size_t size);
   std::span<const std::byte> take(std::size_t count);
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "palpate/io/bag/bag_reader.hpp"
+#include "palpate/io/bag/compression.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
@@ -153,6 +154,24 @@ class ChunkedBag : public BagFile {
     if (size > largest_record)
       at(place).fail("has a " + what + " of " + std::to_string(size) +
                      " bytes, more than can be read");
+  }
+  /// Makes a chunk of `size` the one that was read last.
+  void unpack(std::string_view compression, std::span<const std::byte> packed, std::uint64_t size,
+              std::uint64_t place) {
+    expect_size("chunk", size, place);
+    const std::string where = at(place).text();
+    if (compression.empty() || compression == "none")
+      chunk_.assign(packed.begin(), packed.end());
+    else if (compression == "zstd")
+      chunk_ = decompress_zstd(packed, size, where);
+    else if (compression == "lz4")
+      chunk_ = decompress_lz4(packed, size, where);
+    else if (compression == "bz2")
+      chunk_ = decompress_bz2(packed, size, where);
+    else
+      throw Error(where, "has a chunk of compression '" + std::string(compression) + "'",
+                  "write it with zstd, lz4, bz2 or none");
+    if (chunk_.size() != size) at(place).fail("has a chunk that is not of the size it says");
   }
 
   RandomAccess file_;

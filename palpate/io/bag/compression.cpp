@@ -69,6 +69,26 @@ std::vector<std::byte> decompress(Bytes packed, std::size_t max_bytes, const std
   return bytes;
 }
 
+// The same by bzip2 or zlib, which have alike streams. @param go_on  true where a frame ended
+template <class Stream, class GoOn>
+std::vector<std::byte> decompress_stream(Stream& stream, Bytes packed, std::size_t max_bytes,
+                                         const std::string& name, const GoOn& go_on) {
+  const std::unique_ptr<Stream, FreeContext> context(&stream);
+  return decompress(packed, max_bytes, name, [&](Bytes in, std::span<std::byte> out) {
+    constexpr std::size_t most = std::numeric_limits<unsigned>::max();
+    const auto in_size = static_cast<unsigned>(std::min(in.size(), most));
+    const auto out_size = static_cast<unsigned>(std::min(out.size(), most));
+    using Place = decltype(stream.next_in);
+    stream.next_in = reinterpret_cast<Place>(const_cast<std::byte*>(in.data()));  // is only read
+    stream.avail_in = in_size;
+    std::byte none{};  // zlib refuses no place at all
+    stream.next_out = reinterpret_cast<decltype(stream.next_out)>(out.empty() ? &none : out.data());
+    stream.avail_out = out_size;
+    const bool whole = go_on();
+    return Step{in_size - stream.avail_in, out_size - stream.avail_out, whole};
+  });
+}
+
 }  // namespace
 
 bool is_zstd(std::span<const std::byte> bytes) noexcept {
@@ -114,19 +134,11 @@ std::vector<std::byte> decompress_bz2(std::span<const std::byte> packed, std::si
                                       const std::string& name) {
   bz_stream stream{};
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) throw no_memory(name);
-  const std::unique_ptr<bz_stream, FreeContext> context(&stream);
-  return decompress(packed, max_bytes, name, [&](Bytes in, std::span<std::byte> out) {
-    constexpr std::size_t most = std::numeric_limits<unsigned>::max();
-    const auto in_size = static_cast<unsigned>(std::min(in.size(), most));
-    const auto out_size = static_cast<unsigned>(std::min(out.size(), most));
-    stream.next_in = reinterpret_cast<char*>(const_cast<std::byte*>(in.data()));  // is only read
-    stream.avail_in = in_size;
-    stream.next_out = reinterpret_cast<char*>(out.data());
-    stream.avail_out = out_size;
+  return decompress_stream(stream, packed, max_bytes, name, [&] {
     const int result = BZ2_bzDecompress(&stream);
     if (result != BZ_OK && result != BZ_STREAM_END)
       throw damaged(name, "bzip2's error " + std::to_string(result));
-    return Step{in_size - stream.avail_in, out_size - stream.avail_out, result == BZ_STREAM_END};
+    return result == BZ_STREAM_END;
   });
 }
 
@@ -135,21 +147,12 @@ std::vector<std::byte> decompress_gzip(std::span<const std::byte> packed, std::s
   constexpr int gzip = 16;  // added to the window's bits, of which 0 are the header's
   z_stream stream{};
   if (inflateInit2(&stream, gzip) != Z_OK) throw no_memory(name);
-  const std::unique_ptr<z_stream, FreeContext> context(&stream);
-  return decompress(packed, max_bytes, name, [&](Bytes in, std::span<std::byte> out) {
-    constexpr std::size_t most = std::numeric_limits<uInt>::max();
-    const auto in_size = static_cast<uInt>(std::min(in.size(), most));
-    const auto out_size = static_cast<uInt>(std::min(out.size(), most));
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(in.data()));  // is only read
-    stream.avail_in = in_size;
-    Bytef none = 0;  // zlib refuses no place at all
-    stream.next_out = out.empty() ? &none : reinterpret_cast<Bytef*>(out.data());
-    stream.avail_out = out_size;
+  return decompress_stream(stream, packed, max_bytes, name, [&] {
     const int result = inflate(&stream, Z_NO_FLUSH);
     if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR)
       throw damaged(name, "it is no gzip, or a damaged one");
     if (result == Z_STREAM_END) inflateReset(&stream);
-    return Step{in_size - stream.avail_in, out_size - stream.avail_out, result == Z_STREAM_END};
+    return result == Z_STREAM_END;
   });
 }
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "palpate/io/bag/chunked_bag.hpp"
-#include "palpate/io/bag/compression.hpp"
 #include "palpate/io/bag/mcap_format.hpp"
 
 namespace palpate {
@@ -148,19 +147,6 @@ class McapFile final : public ChunkedBag {
     return {kind, fields.take(fields.number<std::uint64_t>())};
   }
 
-  void take_schema(RecordFields fields) {
-    const auto number = fields.number<std::uint16_t>();
-    schemas_.emplace(number, fields.text());
-  }
-
-  void take_channel(RecordFields fields) {
-    const auto number = fields.number<std::uint16_t>();
-    const auto schema = schemas_.find(fields.number<std::uint16_t>());
-    BagTopic topic{.name = fields.text(), .type = {}};
-    if (schema != schemas_.end()) topic.type = schema->second;
-    topics_.emplace(number, std::move(topic));
-  }
-
   [[nodiscard]] Entry entry_of(std::span<const std::byte> message, std::uint64_t record,
                                std::uint32_t offset) const {
     RecordFields fields(message, at(record));
@@ -174,8 +160,8 @@ class McapFile final : public ChunkedBag {
     return {logged, record, offset, channel};
   }
 
-  // The records of the chunk that begins there, decompressed and checked; they live until those of
-  // another chunk are asked for.
+  // The records of the chunk there, decompressed and checked; they live until the next is asked
+  // for.
   std::span<const std::byte> chunk_at(std::uint64_t place) {
     if (chunk_place_ == place) return chunk_;
     chunk_place_ = 0;
@@ -188,18 +174,7 @@ class McapFile final : public ChunkedBag {
     const auto size = fields.number<std::uint64_t>();
     const auto crc = fields.number<std::uint32_t>();
     const std::string compression = fields.text();
-    const std::span<const std::byte> records = fields.take(fields.number<std::uint64_t>());
-    expect_size("chunk", size, place);
-    if (compression.empty())
-      chunk_.assign(records.begin(), records.end());
-    else if (compression == "zstd")
-      chunk_ = decompress_zstd(records, size, at(place).text());
-    else if (compression == "lz4")
-      chunk_ = decompress_lz4(records, size, at(place).text());
-    else
-      throw Error(at(place).text(), "has a chunk of compression '" + compression + "'",
-                  "write it with zstd, lz4 or none");
-    if (chunk_.size() != size) at(place).fail("has a chunk that is not of the size it says");
+    unpack(compression, fields.take(fields.number<std::uint64_t>()), size, place);
     if (crc != 0 && crc32_on(0, chunk_) != crc)
       at(place).fail("has a chunk that is not what its checksum says");
     chunk_place_ = place;
@@ -276,9 +251,17 @@ class McapFile final : public ChunkedBag {
 
   // Of a schema or a channel; others are passed over.
   void take_definition(const Inner& record, std::uint64_t place) {
-    const RecordFields fields(record.content, at(place));
-    if (record.kind == RecordKind::schema) take_schema(fields);
-    if (record.kind == RecordKind::channel) take_channel(fields);
+    if (record.kind != RecordKind::schema && record.kind != RecordKind::channel) return;
+    RecordFields fields(record.content, at(place));
+    const auto number = fields.number<std::uint16_t>();
+    if (record.kind == RecordKind::schema) {
+      schemas_.emplace(number, fields.text());
+      return;
+    }
+    const auto schema = schemas_.find(fields.number<std::uint16_t>());
+    BagTopic topic{.name = fields.text(), .type = {}};
+    if (schema != schemas_.end()) topic.type = schema->second;
+    topics_.emplace(number, std::move(topic));
   }
 
   void check_attachment(const Record& record) const {

@@ -17,7 +17,7 @@
 
 // The messages of ROS 2's standard packages that a recording is made of; fields in the order and
 // under the names of their definitions, units as ROS has them (REP 103). Each hands its fields, in
-// that order, to whatever writes them, reads them, or lays them out in memory (c_sample.hpp).
+// that order, to whatever writes them, reads them, or lays them out in memory.
 namespace palpate::ros {
 
 /// The name of a type, as an argument of a template.
@@ -226,19 +226,8 @@ struct KeyValue {
   static void walk(auto& way, auto& m) { way(m.key, m.value); }
 };
 
-struct Point {
-  static constexpr std::string_view type = "geometry_msgs/msg/Point";
-  std::array<double, 3> xyz{};
-
-  static void walk(auto& way, auto& m) { way(m.xyz); }
-};
-
-struct Vector3 {
-  static constexpr std::string_view type = "geometry_msgs/msg/Vector3";
-  std::array<double, 3> xyz{};
-
-  static void walk(auto& way, auto& m) { way(m.xyz); }
-};
+using Point = Single<"geometry_msgs/msg/Point", std::array<double, 3>>;
+using Vector3 = Single<"geometry_msgs/msg/Vector3", std::array<double, 3>>;
 
 struct Wrench {
   static constexpr std::string_view type = "geometry_msgs/msg/Wrench";

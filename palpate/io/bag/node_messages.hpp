@@ -151,8 +151,7 @@ struct SetParametersResult {
 
 // ---------------------------------------------------------------------------- services
 
-/// Which request a message of a service belongs to, as rmw_cyclonedds_cpp writes it in front of
-/// requests and replies alike.
+/// Which request a service's message belongs to, as rmw_cyclonedds_cpp writes it in front.
 struct RequestHeader {
   std::uint64_t client = 0;   ///< the client's own name for itself
   std::int64_t sequence = 0;  ///< of the request

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "palpate/io/bag/chunked_bag.hpp"
-#include "palpate/io/bag/compression.hpp"
 #include "palpate/io/bag/messages.hpp"
 
 namespace palpate {
@@ -219,28 +218,15 @@ class Ros1File final : public ChunkedBag {
                      ", which is not declared in the file");
   }
 
-  // The records of the chunk that begins there, decompressed; they live until those of another
-  // chunk are asked for.
+  // The records of the chunk that begins there, decompressed, until the next is asked for.
   std::span<const std::byte> chunk_at(std::uint64_t place) {
     if (chunk_place_ == place) return chunk_;
     chunk_place_ = 0;
     const std::optional<Record> record = record_at(place);
     if (!record) at(place).fail("has a chunk that ends behind the end of the file");
     const Ros1Head head(record->head, at(place));
-    const auto size = head.number<std::uint32_t>("size");
-    const std::string_view compression = head.text("compression");
-    expect_size("chunk", size, place);
-    std::vector<std::byte> content = content_of(*record);
-    if (compression == "none")
-      chunk_ = std::move(content);
-    else if (compression == "lz4")
-      chunk_ = decompress_lz4(content, size, at(place).text());
-    else if (compression == "bz2")
-      chunk_ = decompress_bz2(content, size, at(place).text());
-    else
-      throw Error(at(place).text(), "has a chunk of compression '" + std::string(compression) + "'",
-                  "write it with lz4, bz2 or none");
-    if (chunk_.size() != size) at(place).fail("has a chunk that is not of the size it says");
+    unpack(head.text("compression"), content_of(*record), head.number<std::uint32_t>("size"),
+           place);
     chunk_place_ = place;
     return chunk_;
   }

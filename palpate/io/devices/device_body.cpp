@@ -16,47 +16,16 @@ namespace {
 // Figures measured on, or published for, devices of the kind; the middle where they vary.
 // Touch: 45 to 75 g, 0.5 to 1 N s/m. omega: 0.2 to 0.25 kg, 1 to 2 N s/m, updated at 4 kHz.
 // No separate continuous force is known of omega and Falcon.
+// Of the body: mass, damping, friction, resolution, delay, inertia and damping of turning; of the
+// limits: force, continuous force, stiffness, damping, motors, torque; the reach.
 constexpr std::array presets{
-    DevicePreset{
-        .name = "touch",
-        .body =
-            {.mass = 0.06, .damping = 0.7, .friction = 0.26, .resolution = 0.055e-3, .delay = 1e-3},
-        .limits = {.max_force = 3.3, .continuous_force = 0.88, .max_stiffness = 500.0},
-        .reach = 0.075},
-    DevicePreset{.name = "omega",
-                 .body = {.mass = 0.225,
-                          .damping = 1.5,
-                          .friction = 0.05,
-                          .resolution = 0.01e-3,
-                          .delay = 0.25e-3},
-                 .limits = {.max_force = 12.0,
-                            .continuous_force = 12.0,
-                            .max_stiffness = 5000.0,
-                            .max_damping = 30.0},
-                 .reach = 0.075},
-    DevicePreset{
-        .name = "falcon",
-        .body =
-            {.mass = 0.25, .damping = 1.0, .friction = 0.4, .resolution = 0.06e-3, .delay = 1e-3},
-        .limits = {.max_force = 8.0,
-                   .continuous_force = 8.0,
-                   .max_stiffness = 3000.0,
-                   .max_damping = 20.0},
-        .reach = 0.04},
-    DevicePreset{.name = "sigma",
-                 .body = {.mass = 0.3,
-                          .damping = 1.5,
-                          .friction = 0.05,
-                          .resolution = 0.01e-3,
-                          .delay = 0.25e-3,
-                          .inertia = 1e-4,
-                          .turn_damping = 1e-3},
-                 .limits = {.max_force = 12.0,
-                            .continuous_force = 12.0,
-                            .max_stiffness = 4000.0,
-                            .max_damping = 30.0,
-                            .max_torque = 0.4},
-                 .reach = 0.075},
+    DevicePreset{"touch", {0.06, 0.7, 0.26, 0.055e-3, 1e-3}, {3.3, 0.88, 500.0}, 0.075},
+    DevicePreset{"omega", {0.225, 1.5, 0.05, 0.01e-3, 0.25e-3}, {12.0, 12.0, 5000.0, 30.0}, 0.075},
+    DevicePreset{"falcon", {0.25, 1.0, 0.4, 0.06e-3, 1e-3}, {8.0, 8.0, 3000.0, 20.0}, 0.04},
+    DevicePreset{"sigma",
+                 {0.3, 1.5, 0.05, 0.01e-3, 0.25e-3, 1e-4, 1e-3},
+                 {12.0, 12.0, 4000.0, 30.0, true, 0.4},
+                 0.075},
 };
 
 constexpr std::array grips{
@@ -75,6 +44,61 @@ const auto& row_of(const Rows& rows, std::string_view name, const char* noun,
   }
   throw Error(std::string(noun) + " '" + std::string(name) + "'", "there is no such model",
               "choose one of: " + known);
+}
+
+// Do a matrix's powers vanish? Each is the square of the one before: its eigenvalues would say the
+// same, but take ten times as long to compile.
+bool vanishes(Eigen::MatrixXd power) {
+  constexpr int squarings = 30;      // what neither grows nor shrinks by 1e-8 counts as resting
+  constexpr double endless = 1e150;  // its square is still a number
+  for (int i = 0; i < squarings; ++i) {
+    const double size = power.norm();
+    if (size < 1.0) return true;
+    if (!(size < endless)) return false;
+    power = power.lazyProduct(power).eval();
+  }
+  return false;
+}
+
+// One tick of the loop as a matrix over place and velocity of the handle, its place in the tick
+// before, its filtered velocity, and the forces of the ticks before, the newest first.
+bool decays(const SampledWall& wall, double stiffness) {
+  const double late = std::floor(wall.delay / wall.period + 1e-9);
+  const auto whole = static_cast<Eigen::Index>(late);  // ticks of delay
+  const double rest = std::max(wall.delay - late * wall.period, 0.0);
+  const Eigen::Index size = 4 + whole + 1;
+  const double share = wall.filter > 0.0 ? -std::expm1(-wall.period / wall.filter) : 1.0;
+
+  Eigen::RowVectorXd velocity = Eigen::RowVectorXd::Zero(size);
+  velocity[0] = share / wall.period;
+  velocity[2] = -share / wall.period;
+  velocity[3] = 1.0 - share;
+  Eigen::RowVectorXd force = -wall.damping * velocity;
+  force[0] -= stiffness;
+  const auto force_before = [&](Eigen::Index ticks) {
+    if (ticks == 0) return force;
+    return Eigen::RowVectorXd(Eigen::RowVectorXd::Unit(size, 3 + ticks));
+  };
+  Eigen::MatrixXd state = Eigen::MatrixXd::Identity(size, size).topRows(2);
+  const auto pass = [&](double time, const Eigen::RowVectorXd& held) {
+    const ExactStep step(wall.handle, time);
+    for (Eigen::Index column = 0; column < size; ++column) {
+      Vec3 y = state(0, column) * Vec3::UnitX();
+      Vec3 v = state(1, column) * Vec3::UnitX();
+      step.advance(y, v, held[column] * Vec3::UnitX());
+      state(0, column) = y.x();
+      state(1, column) = v.x();
+    }
+  };
+  if (rest > 0.0) pass(rest, force_before(whole + 1));
+  pass(wall.period - rest, force_before(whole));
+
+  Eigen::MatrixXd tick = Eigen::MatrixXd::Zero(size, size);
+  tick.topRows(2) = state;
+  tick(2, 0) = 1.0;
+  tick.row(3) = velocity;
+  for (Eigen::Index i = 1; i <= whole + 1; ++i) tick.row(3 + i) = force_before(i - 1);
+  return vanishes(tick);
 }
 
 }  // namespace
@@ -133,65 +157,6 @@ void ExactStep::advance(Vec3& y, Vec3& v, const Vec3& g) const noexcept {
   y = yy_ * y0 + yv_ * v0 + yg_ * g;
   v = vy_ * y0 + vv_ * v0 + vg_ * g;
 }
-
-namespace {
-
-// Do a matrix's powers vanish? Each is the square of the one before: its eigenvalues would say the
-// same, but take ten times as long to compile.
-bool vanishes(Eigen::MatrixXd power) {
-  constexpr int squarings = 30;      // what neither grows nor shrinks by 1e-8 counts as resting
-  constexpr double endless = 1e150;  // its square is still a number
-  for (int i = 0; i < squarings; ++i) {
-    const double size = power.norm();
-    if (size < 1.0) return true;
-    if (!(size < endless)) return false;
-    power = power.lazyProduct(power).eval();
-  }
-  return false;
-}
-
-// One tick of the loop as a matrix over place and velocity of the handle, its place in the tick
-// before, its filtered velocity, and the forces of the ticks before, the newest first.
-bool decays(const SampledWall& wall, double stiffness) {
-  const double late = std::floor(wall.delay / wall.period + 1e-9);
-  const auto whole = static_cast<Eigen::Index>(late);  // ticks of delay
-  const double rest = std::max(wall.delay - late * wall.period, 0.0);
-  const Eigen::Index size = 4 + whole + 1;
-  const double share = wall.filter > 0.0 ? -std::expm1(-wall.period / wall.filter) : 1.0;
-
-  Eigen::RowVectorXd velocity = Eigen::RowVectorXd::Zero(size);
-  velocity[0] = share / wall.period;
-  velocity[2] = -share / wall.period;
-  velocity[3] = 1.0 - share;
-  Eigen::RowVectorXd force = -wall.damping * velocity;
-  force[0] -= stiffness;
-  const auto force_before = [&](Eigen::Index ticks) {
-    if (ticks == 0) return force;
-    return Eigen::RowVectorXd(Eigen::RowVectorXd::Unit(size, 3 + ticks));
-  };
-  Eigen::MatrixXd state = Eigen::MatrixXd::Identity(size, size).topRows(2);
-  const auto pass = [&](double time, const Eigen::RowVectorXd& held) {
-    const ExactStep step(wall.handle, time);
-    for (Eigen::Index column = 0; column < size; ++column) {
-      Vec3 y = state(0, column) * Vec3::UnitX();
-      Vec3 v = state(1, column) * Vec3::UnitX();
-      step.advance(y, v, held[column] * Vec3::UnitX());
-      state(0, column) = y.x();
-      state(1, column) = v.x();
-    }
-  };
-  if (rest > 0.0) pass(rest, force_before(whole + 1));
-  pass(wall.period - rest, force_before(whole));
-
-  Eigen::MatrixXd tick = Eigen::MatrixXd::Zero(size, size);
-  tick.topRows(2) = state;
-  tick(2, 0) = 1.0;
-  tick.row(3) = velocity;
-  for (Eigen::Index i = 1; i <= whole + 1; ++i) tick.row(3 + i) = force_before(i - 1);
-  return vanishes(tick);
-}
-
-}  // namespace
 
 double linear_stiffness(const SampledWall& wall, double most) {
   constexpr double softest = 1.0;  // [N/m]

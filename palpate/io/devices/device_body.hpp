@@ -85,9 +85,8 @@ constexpr double delayed_stiffness(const SampledWall& wall) {
   return 2.0 * (wall.handle.damping + wall.damping) / (wall.period + 2.0 * wall.delay);
 }
 
-/// The stiffest spring [N/m] with which the linear loop decays, exactly: no Coulomb friction, no
-/// resolution, no limit of the force, the wall never left. To 0.1 %, up to `most`; 0 where the
-/// softest does not.
+/// The stiffest spring [N/m], up to `most` and to 0.1 %, with which the linear loop decays: no
+/// Coulomb friction, no resolution, no limit of the force, the wall never left. 0: none does.
 double linear_stiffness(const SampledWall& wall, double most);
 
 }  // namespace palpate

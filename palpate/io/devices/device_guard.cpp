@@ -8,10 +8,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <mutex>
 #include <new>
 #include <string>
 #include <thread>
-#include <type_traits>
 #include <utility>
 
 #include <sys/mman.h>
@@ -20,6 +20,7 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/last_gate.hpp"
+#include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -28,59 +29,9 @@ namespace {
 constexpr double opening_time = 30.0;   // [s] for the device to open, or to be enabled
 constexpr double guard_silence = 0.05;  // [s] without the guard's loop: the device is lost
 
-// A value in shared memory that one process writes and the other reads, neither waiting: two slots,
-// of which the number of values written so far names the newer.
-template <class Value>
-class Newest {
-  static_assert(std::is_trivially_copyable_v<Value>);
-
- public:
-  void write(const Value& value) noexcept {
-    const std::uint64_t next = count_.load(std::memory_order_relaxed) + 1;
-    Slot& slot = slots_[next % slots_.size()];
-    slot.count.store(0, std::memory_order_relaxed);
-    std::atomic_thread_fence(std::memory_order_release);
-    std::memcpy(&slot.value, &value, sizeof value);
-    slot.count.store(next, std::memory_order_release);
-    count_.store(next, std::memory_order_release);
-  }
-  // The newest value; false if there is none, or writers were faster than the copy eight times.
-  bool read(Value& value) const noexcept {
-    for (int attempt = 0; attempt < 8; ++attempt) {
-      const std::uint64_t count = count_.load(std::memory_order_acquire);
-      if (count == 0) return false;
-      const Slot& slot = slots_[count % slots_.size()];
-      if (slot.count.load(std::memory_order_acquire) != count) continue;
-      std::memcpy(&value, &slot.value, sizeof value);
-      std::atomic_thread_fence(std::memory_order_acquire);
-      if (slot.count.load(std::memory_order_relaxed) == count) return true;
-    }
-    return false;
-  }
-  [[nodiscard]] std::uint64_t count() const noexcept {
-    return count_.load(std::memory_order_acquire);
-  }
-
- private:
-  struct Slot {
-    std::atomic<std::uint64_t> count{0};
-    Value value{};
-  };
-  std::atomic<std::uint64_t> count_{0};
-  std::array<Slot, 4> slots_{};
-};
-
 struct Command {
   palpate_gate_wish wish;
   std::uint64_t beats;
-};
-
-struct Hand {
-  std::array<double, 3> position;                    // [m]
-  std::optional<std::array<double, 4>> orientation;  // x y z w
-  std::optional<std::uint32_t> buttons;
-  bool present, clutched;
-  DeviceFault fault;
 };
 
 using Text = std::array<char, 256>;
@@ -94,24 +45,23 @@ void put_text(Text& to, const std::string& from) {
 struct Info {
   Text uri, kind, serial;
   DeviceLimits limits;
+  std::optional<DeviceReach> reach;
   std::optional<double> damping, delay, rate;
   double watchdog;
-  std::optional<std::array<double, 6>> reach;  // lowest, highest
-  std::optional<double> radius;                // of the reach
   bool simulated;
 };
-static_assert(std::is_trivially_copyable_v<DeviceLimits>);
 
 enum class Phase : int { opening, open, refused };
 enum class Wish : int { disabled, enabled, ended };
 
+// Shared by both processes: nothing in it has memory of its own.
 struct Memory {
   std::atomic<Phase> phase{Phase::opening};
   Text refusal{};  // written before `phase`
   Info info{};     // likewise
-  Newest<Command> command;
-  Newest<Hand> seen;
-  Newest<Text> fault_text;
+  Mailbox<Command> command;
+  Mailbox<HandState> seen;
+  Mailbox<Text> fault_text;
   std::atomic<std::uint64_t> turns{0};   // of the guard's loop
   std::atomic<std::uint64_t> wishes{0};  // raised with each new wish
   std::atomic<Wish> wish{Wish::disabled};
@@ -120,22 +70,19 @@ struct Memory {
   Text enable_refusal{};  // written before `granted`
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
-static_assert(std::atomic<Phase>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+static_assert(std::atomic<Phase>::is_always_lock_free &&
+              std::atomic<unsigned>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 void put_info(const DeviceInfo& from, double beat_time, Info& to) {
   put_text(to.uri, from.uri);
   put_text(to.kind, from.kind + ", guarded");
   put_text(to.serial, from.serial);
   to.limits = from.limits;
+  to.reach = from.reach;
   to.damping = from.damping;
   to.delay = from.delay;
   to.rate = from.rate;
   to.watchdog = std::min(from.watchdog.value_or(beat_time), beat_time);
-  if (const auto& reach = from.reach) {
-    const auto& [low, high, radius] = *reach;
-    to.reach = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
-    to.radius = radius;
-  }
   to.simulated = from.simulated;
 }
 
@@ -144,10 +91,7 @@ DeviceInfo info_of(const Info& from) {
   info.uri = from.uri.data();
   info.kind = from.kind.data();
   info.limits = from.limits;
-  if (from.reach) {
-    const auto& r = *from.reach;
-    info.reach = DeviceReach{Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]), from.radius};
-  }
+  info.reach = from.reach;
   info.damping = from.damping;
   info.delay = from.delay;
   info.rate = from.rate;
@@ -155,33 +99,6 @@ DeviceInfo info_of(const Info& from) {
   info.simulated = from.simulated;
   info.serial = from.serial.data();
   return info;
-}
-
-Hand hand_of(const HandState& from) {
-  Hand hand{};
-  hand.position = {from.position.x(), from.position.y(), from.position.z()};
-  if (from.orientation)
-    hand.orientation = {from.orientation->x(), from.orientation->y(), from.orientation->z(),
-                        from.orientation->w()};
-  hand.buttons = from.buttons;
-  hand.present = from.present;
-  hand.clutched = from.clutched;
-  hand.fault = from.fault;
-  return hand;
-}
-
-HandState state_of(const Hand& hand) {
-  HandState state;
-  state.position = Vec3(hand.position[0], hand.position[1], hand.position[2]);
-  if (hand.orientation) {
-    const auto& [x, y, z, w] = *hand.orientation;
-    state.orientation = Eigen::Quaterniond(w, x, y, z);
-  }
-  state.buttons = hand.buttons;
-  state.present = hand.present;
-  state.clutched = hand.clutched;
-  state.fault = hand.fault;
-  return state;
 }
 
 // Does what the session wished for last, if it is new.
@@ -211,9 +128,9 @@ class GuardTick {
   // Hazard: dead-process
   void run() noexcept {
     HandState state = device_.read(monotonic_now());
-    memory_.command.read(command_);
+    memory_.command.take();
     const double now = monotonic_now();
-    const auto& [wish, beats] = command_;
+    const auto& [wish, beats] = memory_.command.taken_last();
     gate_.pass(now, beats, {vector_of(wish.force) + vector_of(wish.held), vector_of(wish.torque)});
     // A command that came already leaves the force as it is.
     if (gate_.closed()) {
@@ -228,7 +145,7 @@ class GuardTick {
       state.present = false;  // so that the session's safety chain releases, and engages again
       if (state.fault == DeviceFault::none && beats > 0) state.fault = DeviceFault::other;
     }
-    memory_.seen.write(hand_of(state));
+    memory_.seen.put(state);
     memory_.turns.fetch_add(1, std::memory_order_release);
   }
 
@@ -250,7 +167,6 @@ class GuardTick {
   double beat_time_;  // [s]
   GuardGate gate_;
   LastGate last_gate_;
-  Command command_{};
   std::uint64_t judged_ = 0;  // beats of the last command
 };
 
@@ -265,7 +181,7 @@ void tell_fault(Memory& memory, const Device& device, std::string& told) {
   told = text;
   Text words{};
   put_text(words, text);
-  memory.fault_text.write(words);
+  memory.fault_text.put(words);
 }
 
 // The guard's process: until the session wishes for the end, or has ended.
@@ -351,14 +267,13 @@ class GuardedDevice final : public Device {
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
 
   HandState read(double t) noexcept override {
-    Hand hand{};
-    if (memory_->seen.read(hand)) last_ = state_of(hand);
+    memory_->seen.take();
     const std::uint64_t turns = memory_->turns.load(std::memory_order_acquire);
     if (turns != turns_) {
       turns_ = turns;
       heard_ = t;
     }
-    HandState state = last_;
+    HandState state = memory_->seen.taken_last();
     if (t - heard_ > guard_silence || turns == 0) {
       state.present = false;
       state.fault = DeviceFault::disconnected;
@@ -372,7 +287,7 @@ class GuardedDevice final : public Device {
     palpate_gate_wish wish = std::exchange(announced_, {});
     wish.t = t;
     if (!enabled_.load(std::memory_order_acquire)) wish.force = wish.torque = wish.held = {};
-    memory_->command.write({.wish = wish, .beats = ++beats_});
+    memory_->command.put({.wish = wish, .beats = ++beats_});
   }
 
   void enable() override {
@@ -393,8 +308,9 @@ class GuardedDevice final : public Device {
   }
 
   [[nodiscard]] std::string fault_text() const override {
-    Text text{};
-    return memory_->fault_text.read(text) ? text.data() : "";
+    const std::lock_guard lock(asking_);
+    memory_->fault_text.take();
+    return memory_->fault_text.taken_last().data();
   }
 
  private:
@@ -407,9 +323,9 @@ class GuardedDevice final : public Device {
   pid_t guard_;
   DeviceInfo info_;
   std::atomic<bool> enabled_{false};
+  mutable std::mutex asking_;  // for the fault: any thread may
   // Of the thread that reads and writes:
   palpate_gate_wish announced_{};
-  HandState last_;
   std::uint64_t beats_ = 0;
   std::uint64_t turns_ = 0;
   double heard_ = 0.0;  // [s]

@@ -46,10 +46,8 @@ struct HandleFit {
 
 /// Fits m x'' = F(t - t_d) - b x' - f sign(x') + g to movements along the axes, by weighted
 /// integrals over each (the weak form), so that positions are never differentiated. Only stretches
-/// count in which the handle goes 2 mm or more one way along one axis.
-///
-/// The delay is what leaves the least over, from 0 to 10 ms, common to all axes. Allocates. Not for
-/// a tick.
+/// count in which the handle goes 2 mm or more one way along one axis. The delay is what leaves the
+/// least over, from 0 to 10 ms, common to all axes. Allocates. Not for a tick.
 HandleFit fit_handle(std::span<const HandleSample> samples);
 
 /// How a device is measured.

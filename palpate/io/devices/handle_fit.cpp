@@ -52,17 +52,19 @@ struct Weight {
   Polynomial value, sum;
 };
 
-std::array<Weight, weight_count> make_weights() {
-  constexpr Polynomial bump1{0.0, 1.0, -1.0};
-  constexpr Polynomial odd{-1.0, 2.0};
-  const Polynomial bump = times(bump1, bump1);
-  std::array<Weight, weight_count> weights;
-  Polynomial p = bump;
-  for (Weight& weight : weights) {
-    weight = {p, integral(p)};
-    p = times(p, odd);
-  }
-  return weights;
+const std::array<Weight, weight_count>& weights() {
+  static const auto all = [] {
+    constexpr Polynomial bump{0.0, 1.0, -1.0};
+    constexpr Polynomial odd{-1.0, 2.0};
+    std::array<Weight, weight_count> made;
+    Polynomial p = times(bump, bump);
+    for (Weight& weight : made) {
+      weight = {p, integral(p)};
+      p = times(p, odd);
+    }
+    return made;
+  }();
+  return all;
 }
 
 // One way along an axis: samples first to last.
@@ -147,11 +149,6 @@ struct Equations {
   Eigen::VectorXd left;
   Eigen::Matrix<double, Eigen::Dynamic, unknowns> columns;  // the first, the force's, by the delay
 };
-
-const std::array<Weight, weight_count>& weights() {
-  static const std::array<Weight, weight_count> all = make_weights();
-  return all;
-}
 
 Equations equations_of(std::span<const HandleSample> samples, int axis, std::vector<Swing> swings) {
   Equations equations{axis, std::move(swings), {}, {}};

@@ -23,9 +23,8 @@ struct MouseTarget {
 ///
 /// Between targets the hand follows a critically damped spring, x'' = w^2 (target - x) - 2 w x',
 /// integrated exactly, and is never faster than `max_speed`: a jump of the mouse is a glide. It
-/// turns by the share 1 - exp(-w dt) of what is left, at 4 rad/s at most. Before
-/// the first target nobody holds it, nor when no target has come for `silence`: a page that holds
-/// the hand repeats its target several times a second.
+/// turns by the share 1 - exp(-w dt) of what is left, at 4 rad/s at most. Nobody holds it before
+/// the first target, nor when none has come for `silence`: a page repeats its target.
 class MouseDevice final : public Device {
  public:
   /// @param start      [m] device frame: where the hand is before the first target

@@ -16,43 +16,6 @@
 
 namespace palpate {
 
-// The colour images that a bag has beside a topic of depth: rgb8, bgr8, rgba8 and bgra8, with a
-// CameraInfo, whose distortion is left out as colour is to be looked at. Where their camera stands
-// is told by librealsense's own transforms, by TF, or by a frame_id that is also that of the
-// depth.
-class BagColour {
- public:
-  // Their topic: of several the one whose name is most like that of the depth; empty: there is
-  // none.
-  static std::string topic_beside(BagReader& bag, const std::string& depth);
-
-  // @param bag    must outlive this
-  // @param topic  of the colour images
-  // @param depth  the topic of depth
-  // @param frame  of its images, as their headers name it
-  // @param pose   of the depth camera by TF; null: not used
-  // @throws Error if they cannot be used
-  BagColour(BagReader& bag, const std::string& topic, const std::string& depth,
-            const std::string& frame, const BagTransforms* pose);
-
-  // The image nearest in time, by the times of recording; null: none is within 0.1 s, or it is
-  // damaged.
-  // @param nanoseconds  of the depth image
-  // @param stamp        [s] the same image's, for TF
-  [[nodiscard]] std::shared_ptr<const ColourImage> at(std::int64_t nanoseconds, double stamp,
-                                                      const Eigen::Isometry3d& world_from_depth);
-
- private:
-  [[nodiscard]] std::optional<Eigen::Isometry3d> realsense_pose(const std::string& camera) const;
-
-  BagReader& bag_;
-  std::string topic_;
-  std::vector<BagReader::Place> places_;
-  Intrinsics intrinsics_;
-  Eigen::Isometry3d depth_from_colour_ = Eigen::Isometry3d::Identity();  // unless TF tells
-  std::optional<BagTransforms> colour_in_, depth_in_;  // depth_in_: where the world is its frame
-};
-
 namespace {
 
 constexpr std::int64_t farthest = 100'000'000;  // [ns] from a depth image
@@ -76,9 +39,7 @@ std::optional<Intrinsics> lens_of(BagReader& bag, const std::string& camera) {
     const std::string name = bag.name(camera + last, places.front());
     const std::vector<std::byte> bytes = bag.read(places.front());
     if (bag.find(camera + last)->type == ros::String::type) {
-      RealSenseLens lens = parse_realsense_lens(ros::decode<ros::String>(bytes, name).data, name);
-      lens.coeffs = {};
-      return intrinsics_of(lens, name);
+      return parse_realsense_lens(ros::decode<ros::String>(bytes, name).data, name).pinhole;
     }
     auto info = ros::decode<ros::CameraInfo>(bytes, name);
     info.d.clear();
@@ -87,30 +48,130 @@ std::optional<Intrinsics> lens_of(BagReader& bag, const std::string& camera) {
   return std::nullopt;
 }
 
+}  // namespace
+
+// The colour images that a bag has beside a topic of depth: rgb8, bgr8, rgba8 and bgra8, with a
+// CameraInfo, whose distortion is left out as colour is to be looked at. Where their camera stands
+// librealsense's own transforms tell, or TF, or a frame_id that is also that of the depth.
+class BagColour {
+ public:
+  // Their topic, of several the one whose name is most like that of the depth; empty: none.
+  static std::string topic_beside(BagReader& bag, const std::string& depth) {
+    std::string best;
+    for (const BagReader::Topic& topic : bag.topics()) {
+      if (!is_colour(topic) || bag.places(topic.name).empty()) continue;
+      if (best.empty() || alike(topic.name, depth) > alike(best, depth)) best = topic.name;
+    }
+    return best;
+  }
+
+  // @param frame  of the images of depth, as their headers name it
+  // @param pose   of the depth camera by TF; null: not used
+  // @throws Error if they cannot be used
+  BagColour(BagReader& bag, const std::string& topic, const std::string& depth,
+            const std::string& frame, const BagTransforms* pose)
+      : bag_(bag), topic_(topic), places_(bag.places(topic)) {
+    const std::string camera = camera_of_topic(topic, std::string(ros::Image::type));
+    const std::optional<Intrinsics> lens = lens_of(bag, camera);
+    if (!lens) throw Error("topic " + topic, "has no CameraInfo", "record that topic too");
+    intrinsics_ = *lens;
+    const std::string name = bag_.name(topic_, places_.front());
+    const auto first = ros::decode<ros::Image>(bag_.read(places_.front()), name);
+    static_cast<void>(rgb_of(first, name));
+    if (const auto first_from_colour = realsense_pose(camera)) {
+      const auto first_from_depth = realsense_pose(camera_of_topic(depth, bag.find(depth)->type));
+      if (first_from_depth) depth_from_colour_ = first_from_depth->inverse();
+      depth_from_colour_ = depth_from_colour_ * *first_from_colour;
+      return;
+    }
+    const std::string& own = first.header.frame_id;
+    if (plain_frame(own) == plain_frame(frame)) return;
+    if (pose == nullptr)
+      throw Error("topic " + topic_, "its camera pose relative to the depth camera is unknown",
+                  "record /tf_static, too");
+    const bool in_world = !pose->fixed_frame().empty();
+    const std::string& fixed = in_world ? pose->fixed_frame() : pose->root();
+    colour_in_.emplace(bag_, own, fixed);
+    if (!in_world) depth_in_.emplace(bag_, frame, fixed);
+  }
+
+  // The image nearest in time, by the times of recording [ns]; null: none is within 0.1 s, or it is
+  // damaged. @param stamp  [s] of the depth image, for TF
+  [[nodiscard]] std::shared_ptr<const ColourImage> at(std::int64_t nanoseconds, double stamp,
+                                                      const Eigen::Isometry3d& world_from_depth) {
+    const auto away = [&](const BagReader::Place& place) {
+      return std::abs(place.nanoseconds - nanoseconds);
+    };
+    const auto nearest =
+        std::min_element(places_.begin(), places_.end(),
+                         [&](const auto& a, const auto& b) { return away(a) < away(b); });
+    if (away(*nearest) > farthest) return nullptr;
+    ColourImage::Camera camera{intrinsics_, world_from_depth * depth_from_colour_};
+    if (colour_in_) {
+      const auto in_fixed = colour_in_->at(stamp);
+      const auto depth_in_fixed = depth_in_ ? depth_in_->at(stamp) : std::nullopt;
+      if (!in_fixed || (depth_in_ && !depth_in_fixed)) return nullptr;
+      camera.world_from_camera =
+          depth_in_ ? world_from_depth * depth_in_fixed->inverse() * *in_fixed : *in_fixed;
+    }
+    try {
+      const std::string name = bag_.name(topic_, *nearest);
+      const auto image = ros::decode<ros::Image>(bag_.read(*nearest), name);
+      return std::make_shared<ColourImage>(ColourImage{static_cast<int>(image.width),
+                                                       static_cast<int>(image.height),
+                                                       rgb_of(image, name), camera});
+    } catch (const Error&) {
+      return nullptr;
+    }
+  }
+
+ private:
+  // Where the stream stands from the device's first, as librealsense has it; none: not told.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> realsense_pose(const std::string& camera) const {
+    for (const BagReader::Topic& topic : bag_.topics()) {
+      if (!topic.name.starts_with(camera + "/tf/") || topic.type != ros::Transform::type) continue;
+      const std::vector<BagReader::Place> places = bag_.places(topic.name);
+      if (places.empty()) continue;
+      const std::string name = bag_.name(topic.name, places.front());
+      const auto told = ros::decode<ros::Transform>(bag_.read(places.front()), name);
+      ros::TransformStamped stream_from_first;
+      stream_from_first.translation = told.translation;
+      stream_from_first.rotation = told.rotation;
+      return sample_of(stream_from_first, name).pose().inverse();
+    }
+    return std::nullopt;
+  }
+
+  BagReader& bag_;
+  std::string topic_;
+  std::vector<BagReader::Place> places_;
+  Intrinsics intrinsics_;
+  Eigen::Isometry3d depth_from_colour_ = Eigen::Isometry3d::Identity();  // unless TF tells
+  std::optional<BagTransforms> colour_in_, depth_in_;  // depth_in_: where the world is its frame
+};
+
+namespace {
+
 constexpr double least_unit = 1e-6, largest_unit = 0.1;  // [m] of a RealSense's depth
 
 std::string parent(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
 
 // Of librealsense, whose models have names of their own.
-RealSenseLens realsense_lens(const ros::CameraInfo& info) {
-  RealSenseLens lens{.width = static_cast<int>(std::min(info.width, largest_side + 1)),
-                     .height = static_cast<int>(std::min(info.height, largest_side + 1)),
-                     .ppx = info.k[2],
-                     .ppy = info.k[5],
-                     .fx = info.k[0],
-                     .fy = info.k[4],
-                     .model = info.distortion_model,
-                     .coeffs = {}};
+Intrinsics realsense_intrinsics(ros::CameraInfo info, const std::string& name) {
+  RealSenseLens lens;
+  lens.model = info.distortion_model;
   std::copy_n(info.d.begin(), std::min(info.d.size(), lens.coeffs.size()), lens.coeffs.begin());
-  return lens;
+  info.d.clear();
+  lens.pinhole = intrinsics_of(info, false, name);
+  return intrinsics_of(lens, name);
 }
 
-class Recording final : public Source {
+class Recording final : public NumberedSource {
  public:
   Recording(const Uri& uri, const BagCamera::Options& options, SourceInfo info)
-      : bag_(uri.path()),
-        camera_(bag_, choose(uri.text_option("topic", ""), info), options),
-        info_(std::move(info)) {
+      : NumberedSource(std::move(info)),
+        bag_(uri.path()),
+        camera_(bag_, choose(uri.text_option("topic", "")), options) {
     if (camera_.frames() == 0)
       throw Error(info_.uri, "holds no frames on " + camera_.topic(),
                   "name another topic with ?topic=");
@@ -143,33 +204,23 @@ class Recording final : public Source {
     return std::nullopt;
   }
 
-  std::size_t skip(std::size_t count) override {
-    const std::size_t skipped = std::min(count, camera_.frames() - next_);
-    next_ += skipped;
-    return skipped;
-  }
-
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
  private:
-  std::string choose(const std::string& wanted, SourceInfo& info) const {
+  std::string choose(const std::string& wanted) {
     const std::vector<std::string> topics = BagCamera::topics_of(bag_);
     if (!wanted.empty()) return wanted;
     if (topics.empty())
-      throw Error(info.uri, "has no topic of depth images or points",
+      throw Error(info_.uri, "has no topic of depth images or points",
                   "record one, or name it with ?topic=");
     std::string others;
     for (std::size_t i = 1; i < topics.size(); ++i) others += " " + topics[i];
     if (!others.empty())
-      info.notes.push_back(topics.front() + " is read; also there, by ?topic=:" + others);
+      info_.notes.push_back(topics.front() + " is read; also there, by ?topic=:" + others);
     return topics.front();
   }
 
   BagReader bag_;
   BagCamera camera_;
-  SourceInfo info_;
   double first_ = 0.0;
-  std::size_t next_ = 0;
 };
 
 }  // namespace
@@ -383,7 +434,7 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
       k = intrinsics_of(parse_realsense_lens(described, info_name), info_name);
     } else {
       const auto info = ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name);
-      k = is_realsense_ ? intrinsics_of(realsense_lens(info), info_name)
+      k = is_realsense_ ? realsense_intrinsics(info, info_name)
                         : intrinsics_of(info, is_rectified, info_name);
     }
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
@@ -391,9 +442,8 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
   const Intrinsics& k = rays_->intrinsics();
   if (k.width != static_cast<int>(image.width) || k.height != static_cast<int>(image.height))
     throw Error(name(number),
-                "is an image of " + std::to_string(image.width) + "x" +
-                    std::to_string(image.height) + " pixels, but its CameraInfo has " +
-                    std::to_string(k.width) + "x" + std::to_string(k.height),
+                "is an image of " + size_text(image.width, image.height) +
+                    " pixels, but its CameraInfo has " + size_text(k.width, k.height),
                 "it may be damaged, or belong to another topic");
   return rays_;
 }
@@ -468,9 +518,8 @@ std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, doub
   const Intrinsics& k = rays_->intrinsics();
   if (png.width != k.width || png.height != k.height)
     throw Error(where,
-                "is an image of " + std::to_string(png.width) + "x" + std::to_string(png.height) +
-                    " pixels, but its camera has " + std::to_string(k.width) + "x" +
-                    std::to_string(k.height),
+                "is an image of " + size_text(png.width, png.height) +
+                    " pixels, but its camera has " + size_text(k.width, k.height),
                 "it may be damaged");
   materials_ =
       std::make_shared<LabelImage>(std::move(names), std::move(labels), std::move(brightness));
@@ -492,89 +541,6 @@ std::optional<Frame> BagCamera::frame(std::size_t number) {
   std::shared_ptr<const ColourImage> colour = seen.colour();
   if (colour_) colour = colour_->at(places_[number].nanoseconds, taken, *pose);
   return Frame{taken, cloud_of(std::move(seen), rays_, *pose, organised_), std::move(colour)};
-}
-
-std::string BagColour::topic_beside(BagReader& bag, const std::string& depth) {
-  std::string best;
-  for (const BagReader::Topic& topic : bag.topics()) {
-    if (!is_colour(topic) || bag.places(topic.name).empty()) continue;
-    if (best.empty() || alike(topic.name, depth) > alike(best, depth)) best = topic.name;
-  }
-  return best;
-}
-
-// Where the stream stands from the device's first, as librealsense has it; none: not told.
-std::optional<Eigen::Isometry3d> BagColour::realsense_pose(const std::string& camera) const {
-  for (const BagReader::Topic& topic : bag_.topics()) {
-    if (!topic.name.starts_with(camera + "/tf/") || topic.type != ros::Transform::type) continue;
-    const std::vector<BagReader::Place> places = bag_.places(topic.name);
-    if (places.empty()) continue;
-    const std::string name = bag_.name(topic.name, places.front());
-    const auto told = ros::decode<ros::Transform>(bag_.read(places.front()), name);
-    ros::TransformStamped stream_from_first;
-    stream_from_first.translation = told.translation;
-    stream_from_first.rotation = told.rotation;
-    return pose_of(sample_of(stream_from_first, name)).inverse();
-  }
-  return std::nullopt;
-}
-
-BagColour::BagColour(BagReader& bag, const std::string& topic, const std::string& depth,
-                     const std::string& frame, const BagTransforms* pose)
-    : bag_(bag), topic_(topic), places_(bag.places(topic)) {
-  const std::string camera = camera_of_topic(topic, std::string(ros::Image::type));
-  const std::optional<Intrinsics> lens = lens_of(bag, camera);
-  if (!lens) throw Error("topic " + topic, "has no CameraInfo", "record that topic too");
-  intrinsics_ = *lens;
-  const std::string name = bag_.name(topic_, places_.front());
-  const auto first = ros::decode<ros::Image>(bag_.read(places_.front()), name);
-  static_cast<void>(rgb_of(first, name));
-  if (const auto first_from_colour = realsense_pose(camera)) {
-    const auto first_from_depth = realsense_pose(camera_of_topic(depth, bag.find(depth)->type));
-    if (first_from_depth) depth_from_colour_ = first_from_depth->inverse();
-    depth_from_colour_ = depth_from_colour_ * *first_from_colour;
-    return;
-  }
-  const std::string& own = first.header.frame_id;
-  if (plain_frame(own) == plain_frame(frame)) return;
-  if (pose == nullptr)
-    throw Error("topic " + topic_, "its camera pose relative to the depth camera is unknown",
-                "record /tf_static, too");
-  const bool in_world = !pose->fixed_frame().empty();
-  const std::string& fixed = in_world ? pose->fixed_frame() : pose->root();
-  colour_in_.emplace(bag_, own, fixed);
-  if (!in_world) depth_in_.emplace(bag_, frame, fixed);
-}
-
-std::shared_ptr<const ColourImage> BagColour::at(std::int64_t nanoseconds, double stamp,
-                                                 const Eigen::Isometry3d& world_from_depth) {
-  const auto away = [&](const BagReader::Place& place) {
-    return std::abs(place.nanoseconds - nanoseconds);
-  };
-  const auto nearest =
-      std::min_element(places_.begin(), places_.end(),
-                       [&](const auto& a, const auto& b) { return away(a) < away(b); });
-  if (away(*nearest) > farthest) return nullptr;
-  ColourImage::Camera camera{intrinsics_, world_from_depth * depth_from_colour_};
-  if (colour_in_) {
-    const auto in_fixed = colour_in_->at(stamp);
-    const auto depth_in_fixed = depth_in_ ? depth_in_->at(stamp) : std::nullopt;
-    if (!in_fixed || (depth_in_ && !depth_in_fixed)) return nullptr;
-    camera.world_from_camera =
-        depth_in_ ? world_from_depth * depth_in_fixed->inverse() * *in_fixed : *in_fixed;
-  }
-  try {
-    const std::string name = bag_.name(topic_, *nearest);
-    const auto image = ros::decode<ros::Image>(bag_.read(*nearest), name);
-    auto colour = std::make_shared<ColourImage>();
-    colour->width = static_cast<int>(image.width);
-    colour->height = static_cast<int>(image.height);
-    colour->rgb = rgb_of(image, name);
-    colour->camera = camera;
-    return colour;
-  } catch (const Error&) {
-    return nullptr;
-  }
 }
 
 std::unique_ptr<Source> open_recording(const Uri& uri) {

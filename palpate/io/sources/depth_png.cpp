@@ -3,13 +3,11 @@
 
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
 #include <new>
 #include <string_view>
-#include <system_error>
 
 #include <png.h>
 
@@ -110,20 +108,9 @@ class PngReader {
   png_infop info_;
 };
 
-const char* colour_name(int colour) {
-  switch (colour) {
-    case PNG_COLOR_TYPE_GRAY:
-      return "grey";
-    case PNG_COLOR_TYPE_GRAY_ALPHA:
-      return "grey and alpha";
-    case PNG_COLOR_TYPE_PALETTE:
-      return "palette";
-    case PNG_COLOR_TYPE_RGB:
-      return "colour";
-    default:
-      return "colour and alpha";
-  }
-}
+// Of PNG's types of colour, by their numbers.
+constexpr std::array<const char*, 7> colour_names{
+    "grey", "", "colour", "palette", "grey and alpha", "", "colour and alpha"};
 
 void append(png_structp png, png_bytep from, std::size_t count) {
   auto* to = static_cast<std::vector<std::byte>*>(png_get_io_ptr(png));
@@ -158,35 +145,12 @@ bool write_rows(std::vector<std::byte>& to, Failure& failure, png_uint_32 width,
   return true;
 }
 
-std::vector<std::byte> encode(int width, int height, std::span<const std::uint16_t> depth,
-                              const std::string& name) {
-  constexpr auto largest = static_cast<int>(largest_png_side);
-  if (width < 1 || height < 1 || width > largest || height > largest ||
-      depth.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    throw Error(name,
-                std::to_string(depth.size()) + " values do not make an image of " +
-                    std::to_string(width) + "x" + std::to_string(height),
-                "give width*height values, sides up to 16384");
-  }
-  std::vector<png_bytep> rows(static_cast<std::size_t>(height));
-  for (std::size_t v = 0; v < rows.size(); ++v) {
-    // libpng only reads them, but its interface does not say so.
-    rows[v] = reinterpret_cast<png_bytep>(
-        const_cast<std::uint16_t*>(depth.data() + v * static_cast<std::size_t>(width)));
-  }
-  std::vector<std::byte> bytes;
-  Failure failure;
-  if (!write_rows(bytes, failure, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height),
-                  rows.data()))
-    throw Error(name, "cannot be packed: " + std::string(failure.text.data()));
-  return bytes;
-}
-
 // The pixels of an image, `channels` values each; `set_up` checks its header and configures the
 // reader, false where libpng fails.
-template <class Value, std::size_t channels = 1, class SetUp>
+template <class Value, class SetUp>
 std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& name,
-                          const char* needed, int& width, int& height, const SetUp& set_up) {
+                          const char* needed, int& width, int& height, std::size_t channels,
+                          const SetUp& set_up) {
   const auto* signature = reinterpret_cast<png_const_bytep>(bytes.data());
   if (bytes.size() < signature_size || png_sig_cmp(signature, 0, signature_size) != 0)
     throw Error(name, bytes.empty() ? "is empty" : "is not a PNG image", needed);
@@ -197,7 +161,7 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
                  "copy or record it again, it may have been cut short");
   };
   if (!reader.read_header(header) || !set_up(reader, header)) throw damaged();
-  const std::string size = std::to_string(header.width) + "x" + std::to_string(header.height);
+  const std::string size = size_text(header.width, header.height);
   if (header.width > largest_png_side || header.height > largest_png_side)
     throw Error(name, "is an image of " + size + " pixels",
                 "images up to 16384x16384 can be read; it may be damaged");
@@ -223,17 +187,15 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
 
 DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name) {
   const char* const needed = "a 16-bit grey PNG is needed";
+  const auto check = [&](PngReader& /*reader*/, const PngReader::Header& header) {
+    if (header.bits == 16 && header.colour == PNG_COLOR_TYPE_GRAY) return true;
+    const char* const colour = colour_names.at(static_cast<std::size_t>(header.colour));
+    throw Error(name,
+                "is a PNG of " + std::to_string(header.bits) + "-bit " + colour + ", not of depth",
+                needed);
+  };
   DepthPng image;
-  image.depth =
-      decode<std::uint16_t>(bytes, name, needed, image.width, image.height,
-                            [&](PngReader& /*reader*/, const PngReader::Header& header) {
-                              if (header.bits != 16 || header.colour != PNG_COLOR_TYPE_GRAY)
-                                throw Error(name,
-                                            "is a PNG of " + std::to_string(header.bits) + "-bit " +
-                                                colour_name(header.colour) + ", not of depth",
-                                            needed);
-                              return true;
-                            });
+  image.depth = decode<std::uint16_t>(bytes, name, needed, image.width, image.height, 1, check);
   return image;
 }
 
@@ -241,40 +203,38 @@ DepthPng read_depth_png(const std::filesystem::path& path) {
   return parse_depth_png(read_file(path, largest_png_file), path.string());
 }
 
-GreyPng read_grey_png(const std::filesystem::path& path) {
-  GreyPng image;
-  image.brightness = decode<std::uint8_t>(
+LightPng read_light_png(const std::filesystem::path& path, bool in_colour) {
+  LightPng image;
+  image.values = decode<std::uint8_t>(
       read_file(path, largest_png_file), path.string(), "a PNG is needed", image.width,
-      image.height,
-      [](PngReader& reader, const auto& header) { return reader.turn(header, false); });
-  return image;
-}
-
-ColourPng read_colour_png(const std::filesystem::path& path) {
-  ColourPng image;
-  image.rgb = decode<std::uint8_t, 3>(
-      read_file(path, largest_png_file), path.string(), "a PNG is needed", image.width,
-      image.height,
-      [](PngReader& reader, const auto& header) { return reader.turn(header, true); });
+      image.height, in_colour ? 3 : 1,
+      [&](PngReader& reader, const auto& header) { return reader.turn(header, in_colour); });
   return image;
 }
 
 std::vector<std::byte> encode_depth_png(int width, int height,
                                         std::span<const std::uint16_t> depth) {
-  return encode(width, height, depth, "depth image");
-}
-
-void write_depth_png(const std::filesystem::path& path, int width, int height,
-                     std::span<const std::uint16_t> depth) {
-  const std::vector<std::byte> bytes = encode(width, height, depth, path.string());
-  errno = 0;
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  const bool written =
-      file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-  const bool closed = file != nullptr && std::fclose(file) == 0;
-  if (!written || !closed)
-    throw Error(path.string(), "cannot be written: " + std::generic_category().message(errno),
-                "check the folder, its permissions and the space on the disk");
+  const std::string name = "depth image";
+  constexpr auto largest = static_cast<int>(largest_png_side);
+  if (width < 1 || height < 1 || width > largest || height > largest ||
+      depth.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    throw Error(name,
+                std::to_string(depth.size()) + " values do not make an image of " +
+                    size_text(width, height),
+                "give width*height values, sides up to 16384");
+  }
+  std::vector<png_bytep> rows(static_cast<std::size_t>(height));
+  for (std::size_t v = 0; v < rows.size(); ++v) {
+    // libpng only reads them, but its interface does not say so.
+    rows[v] = reinterpret_cast<png_bytep>(
+        const_cast<std::uint16_t*>(depth.data() + v * static_cast<std::size_t>(width)));
+  }
+  std::vector<std::byte> bytes;
+  Failure failure;
+  if (!write_rows(bytes, failure, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height),
+                  rows.data()))
+    throw Error(name, "cannot be packed: " + std::string(failure.text.data()));
+  return bytes;
 }
 
 }  // namespace palpate

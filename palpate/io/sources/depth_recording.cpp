@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/io/sources/depth_recording.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/intrinsics_file.hpp"
+#include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/trajectory.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -39,14 +38,14 @@ std::string colour_left_out(const Error& error) {
   return std::string("colour is skipped: ") + error.what();
 }
 
-class DepthRecording final : public Source {
+class DepthRecording final : public NumberedSource {
  public:
   DepthRecording(const RecordedCamera& camera, std::vector<RecordedImage> images, SourceInfo info,
                  bool colour_is_asked_for)
-      : camera_(camera),
+      : NumberedSource(std::move(info)),
+        camera_(camera),
         rays_(std::make_shared<const ViewingRays>(camera.intrinsics)),
         images_(std::move(images)),
-        info_(std::move(info)),
         colour_is_asked_for_(colour_is_asked_for) {
     info_.sensor = camera.sensor;
   }
@@ -56,30 +55,22 @@ class DepthRecording final : public Source {
     const RecordedImage& image = images_[next_++];  // before anything can throw
     DepthPng png = read_depth_png(image.file);
     check_size(image.file, png.width, png.height);
-    GreyPng grey;
-    if (!image.brightness.empty()) {
-      grey = read_grey_png(image.brightness);
-      check_size(image.brightness, grey.width, grey.height);
-    }
+    std::vector<std::uint8_t> grey;
+    if (!image.brightness.empty()) grey = light(image.brightness, false);
     for (const std::uint16_t no_value : {camera_.invalid_value, camera_.saturated_value}) {
       if (is_measured(no_value))
         std::replace(png.depth.begin(), png.depth.end(), no_value, std::uint16_t{0});
     }
     Frame frame{image.stamp,
                 std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
-                                             image.world_from_camera, std::move(grey.brightness))};
-    if (!image.labels.empty()) {
-      GreyPng labels = read_grey_png(image.labels);
-      check_size(image.labels, labels.width, labels.height);
-      frame.labels =
-          std::make_shared<const std::vector<std::uint8_t>>(std::move(labels.brightness));
-    }
+                                             image.world_from_camera, std::move(grey))};
+    if (!image.labels.empty())
+      frame.labels = std::make_shared<const std::vector<std::uint8_t>>(light(image.labels, false));
     if (image.colour.empty()) return frame;
     try {
-      ColourPng colour = read_colour_png(image.colour);
-      check_size(image.colour, colour.width, colour.height);
+      const Intrinsics& k = camera_.intrinsics;
       frame.colour = std::make_shared<const ColourImage>(
-          ColourImage{colour.width, colour.height, std::move(colour.rgb)});
+          ColourImage{k.width, k.height, light(image.colour, true)});
     } catch (const Error& error) {
       if (colour_is_asked_for_) throw;
       for (RecordedImage& each : images_) each.colour.clear();
@@ -88,30 +79,25 @@ class DepthRecording final : public Source {
     return frame;
   }
 
-  std::size_t skip(std::size_t count) override {
-    const std::size_t skipped = std::min(count, images_.size() - next_);
-    next_ += skipped;
-    return skipped;
+ private:
+  [[nodiscard]] std::vector<std::uint8_t> light(const fs::path& file, bool in_colour) const {
+    LightPng png = read_light_png(file, in_colour);
+    check_size(file, png.width, png.height);
+    return std::move(png.values);
   }
 
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
- private:
   void check_size(const fs::path& file, int width, int height) const {
     const Intrinsics& k = camera_.intrinsics;
     if (width == k.width && height == k.height) return;
     throw Error(file.string(),
-                "is an image of " + std::to_string(width) + "x" + std::to_string(height) +
-                    " pixels, but the camera has " + std::to_string(k.width) + "x" +
-                    std::to_string(k.height),
+                "is an image of " + size_text(width, height) + " pixels, but the camera has " +
+                    size_text(k.width, k.height),
                 "write an intrinsics.json for this camera");
   }
 
   RecordedCamera camera_;
   std::shared_ptr<const ViewingRays> rays_;
   std::vector<RecordedImage> images_;
-  std::size_t next_ = 0;
-  SourceInfo info_;
   bool colour_is_asked_for_;
 };
 
@@ -221,8 +207,6 @@ double median_rate(const std::vector<RecordedImage>& images) {
   std::nth_element(intervals.begin(), middle, intervals.end());
   return 1.0 / *middle;
 }
-
-bool is_json(const fs::path& path) { return path.extension() == ".json"; }
 
 }  // namespace
 
@@ -345,7 +329,7 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   }
   const std::string poses = uri.text_option("poses", "none");
   const fs::path poses_file = (is_folder ? path : folder) / poses;
-  const bool matrices = poses != "none" && is_json(poses_file);
+  const bool matrices = poses != "none" && poses_file.extension() == ".json";
   if (matrices) {
     const auto world_from_camera =
         parse_pose_matrices(read_text(poses_file, largest_text), poses_file.string());

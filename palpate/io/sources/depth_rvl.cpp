@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
@@ -15,8 +16,18 @@ constexpr std::size_t most_pixels = std::size_t{1} << 24U;
 constexpr std::size_t header = 8;  // width and height
 constexpr int nibbles_per_word = 8;
 
-// Nibbles, the first one in a word's highest bits. Words are little-endian: those of the machines
-// that wrote the first of them.
+// The lowest `size` bytes of a number, at most 4.
+void put_little_endian(std::vector<std::byte>& to, std::uint32_t value, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i)
+    to.push_back(static_cast<std::byte>(value >> (8 * i) & 0xffU));
+}
+
+template <class Number>
+Number little_endian(std::span<const std::byte> bytes, std::size_t at) {
+  return detail::load<Number>(&bytes[at], std::endian::little);
+}
+
+// Nibbles, the first one in a word's highest bits, in little-endian words.
 class NibbleWriter {
  public:
   explicit NibbleWriter(std::vector<std::byte>& to) : to_(to) {}
@@ -67,7 +78,7 @@ class NibbleReader {
   std::uint32_t next() {
     if (left_ == 0) {
       if (from_.size() - at_ < 4) throw Error(name_, "ends too early", "it may be damaged");
-      word_ = little_endian(from_, at_, 4);
+      word_ = little_endian<std::uint32_t>(from_, at_);
       at_ += 4;
       left_ = nibbles_per_word;
     }
@@ -84,6 +95,35 @@ class NibbleReader {
   int left_ = 0;
 };
 
+constexpr std::size_t slice_header = 8;
+// A packet of Ethernet has 1500 bytes, of which protocols and the message take some 200.
+constexpr std::size_t most_bytes = 1280;
+constexpr double margin = 0.9;  // of it that is aimed at: packing again takes time
+constexpr int most_rows = 16;   // what a lost slice leaves unseen
+constexpr std::size_t most_slice_pixels = std::size_t{1} << 24U;  // as in RVL: no camera has more
+
+struct SliceHeader {
+  std::uint32_t number = 0;
+  std::uint16_t first_row = 0, rows = 0;
+  std::uint32_t own_rows = 0;
+};
+
+SliceHeader header_of(std::span<const std::byte> bytes, const std::string& name) {
+  if (bytes.size() < slice_header + 8) throw Error(name, "ends too early", "it may be damaged");
+  const SliceHeader slice{little_endian<std::uint32_t>(bytes, 0),
+                          little_endian<std::uint16_t>(bytes, 4),
+                          little_endian<std::uint16_t>(bytes, 6),
+                          little_endian<std::uint32_t>(bytes, slice_header + 4)};  // of RVL
+  if (slice.first_row >= slice.rows || slice.own_rows > slice.rows)
+    throw Error(name, "is a slice beyond its image", "it may be damaged");
+  return slice;
+}
+
+// Numbers of images go round.
+bool is_newer(std::uint32_t number, std::uint32_t than) {
+  return static_cast<std::int32_t>(number - than) > 0;
+}
+
 }  // namespace
 
 std::vector<std::byte> encode_depth_rvl(int width, int height,
@@ -94,7 +134,7 @@ std::vector<std::byte> encode_depth_rvl(int width, int height,
       depth.size() != std::size_t{columns} * rows)
     throw Error("depth image",
                 std::to_string(depth.size()) + " values do not make an image of " +
-                    std::to_string(width) + "x" + std::to_string(height),
+                    size_text(width, height),
                 "give width*height values, sides up to 16384");
   std::vector<std::byte> bytes;
   bytes.reserve(header + depth.size());
@@ -120,14 +160,12 @@ std::vector<std::byte> encode_depth_rvl(int width, int height,
 
 DepthPng parse_depth_rvl(std::span<const std::byte> bytes, const std::string& name) {
   if (bytes.size() < header) throw Error(name, "ends too early", "it may be damaged");
-  const std::uint32_t width = little_endian(bytes, 0, 4);
-  const std::uint32_t height = little_endian(bytes, 4, 4);
+  const std::uint32_t width = little_endian<std::uint32_t>(bytes, 0);
+  const std::uint32_t height = little_endian<std::uint32_t>(bytes, 4);
   const std::size_t count = std::size_t{width} * height;
   if (count == 0 || width > largest_rvl_side || height > largest_rvl_side || count > most_pixels)
-    throw Error(
-        name,
-        "promises an image of " + std::to_string(width) + "x" + std::to_string(height) + " pixels",
-        "it may be damaged");
+    throw Error(name, "promises an image of " + size_text(width, height) + " pixels",
+                "it may be damaged");
   DepthPng image{static_cast<int>(width), static_cast<int>(height), {}};
   image.depth.reserve(std::min(count, 8 * bytes.size()));
   NibbleReader reader(bytes.subspan(header), name);
@@ -148,39 +186,6 @@ DepthPng parse_depth_rvl(std::span<const std::byte> bytes, const std::string& na
   }
   return image;
 }
-namespace {
-
-constexpr std::size_t slice_header = 8;
-// A packet of Ethernet has 1500 bytes, of which protocols and the message around this take some
-// 200.
-constexpr std::size_t most_bytes = 1280;
-constexpr double margin = 0.9;  // of it that is aimed at: packing again takes time
-constexpr int most_rows = 16;   // what a lost slice leaves unseen
-constexpr std::size_t most_slice_pixels = std::size_t{1} << 24U;  // as in RVL: no camera has more
-
-struct SliceHeader {
-  std::uint32_t number = 0;
-  std::uint16_t first_row = 0, rows = 0;
-  std::uint32_t own_rows = 0;
-};
-
-SliceHeader header_of(std::span<const std::byte> bytes, const std::string& name) {
-  if (bytes.size() < slice_header + 8) throw Error(name, "ends too early", "it may be damaged");
-  const SliceHeader slice{little_endian(bytes, 0, 4),
-                          static_cast<std::uint16_t>(little_endian(bytes, 4, 2)),
-                          static_cast<std::uint16_t>(little_endian(bytes, 6, 2)),
-                          little_endian(bytes, slice_header + 4, 4)};  // of RVL: width, rows
-  if (slice.first_row >= slice.rows || slice.own_rows > slice.rows)
-    throw Error(name, "is a slice beyond its image", "it may be damaged");
-  return slice;
-}
-
-// Numbers of images go round.
-bool is_newer(std::uint32_t number, std::uint32_t than) {
-  return static_cast<std::int32_t>(number - than) > 0;
-}
-
-}  // namespace
 
 void encode_depth_slices(std::uint32_t number, int width, int height,
                          std::span<const std::uint16_t> depth,
@@ -189,7 +194,7 @@ void encode_depth_slices(std::uint32_t number, int width, int height,
       depth.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
     throw Error("depth image",
                 std::to_string(depth.size()) + " values do not make an image of " +
-                    std::to_string(width) + "x" + std::to_string(height),
+                    size_text(width, height),
                 "give width*height values");
   int wanted = 1;  // rows of a slice: as many as fit if they are like those of the slice before
   for (int row = 0; row < height;) {

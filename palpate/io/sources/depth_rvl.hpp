@@ -2,9 +2,8 @@
 #pragma once
 
 // RVL, the run-length code for depth images: A. Wilson, "Fast lossless depth image compression",
-// ISS 2017. Runs of zeros and of values take turns; of values the differences to the one before are
-// kept. All numbers are of a variable length, three bits and a flag at a time. As in
-// compressed_depth_image_transport, width and height come first.
+// ISS 2017. Runs of zeros and of values, as differences, take turns; numbers are of a variable
+// length. As in compressed_depth_image_transport, width and height come first.
 
 #include <cstddef>
 #include <cstdint>
@@ -28,24 +27,8 @@ std::vector<std::byte> encode_depth_rvl(int width, int height,
 /// @throws Error if it is cut short, or holds more or other pixels than it promises.
 DepthPng parse_depth_rvl(std::span<const std::byte> bytes, const std::string& name);
 
-/// The number of `size` bytes, at most 4, at a place of `bytes`, which must be so long.
-inline std::uint32_t little_endian(std::span<const std::byte> bytes, std::size_t at,
-                                   std::size_t size) {
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < size; ++i)
-    value |= std::to_integer<std::uint32_t>(bytes[at + i]) << (8 * i);
-  return value;
-}
-
-/// The lowest `size` bytes of a number, at most 4.
-inline void put_little_endian(std::vector<std::byte>& to, std::uint32_t value, std::size_t size) {
-  for (std::size_t i = 0; i < size; ++i)
-    to.push_back(static_cast<std::byte>(value >> (8 * i) & 0xffU));
-}
-
 // Depth images in slices of some rows, each of which fits into one packet and can be read without
-// the others: what a link loses is a hole of a few rows, not the image, and nothing waits for it
-// to be sent again.
+// the others: what a link loses is a hole of a few rows, which nothing waits for.
 
 /// Hands each slice to `send` as soon as it is packed: a header of 8 bytes (u32 number of the
 /// image, u16 first row, u16 rows of the image; little-endian), then its rows as RVL.
@@ -56,10 +39,7 @@ void encode_depth_slices(std::uint32_t number, int width, int height,
                          std::span<const std::uint16_t> depth,
                          const std::function<void(std::span<const std::byte>)>& send);
 
-/// Puts images together from their slices. A slice of a newer image ends the one before, so that no
-/// image waits for what was lost.
-///
-/// Values in, values out: no clock, no thread.
+/// Puts images together from their slices. A slice of a newer image ends the one before.
 class SliceAssembler {
  public:
   struct Image {

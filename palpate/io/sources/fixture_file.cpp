@@ -179,11 +179,9 @@ std::shared_ptr<const FixtureSet> fixtures_from_json(std::string_view text,
         for (int i = 0; i < 12; ++i)
           f.world_from_fixture(i / 4, i % 4) = pose.at(static_cast<std::size_t>(i)).get<double>();
       }
-      if (entry.contains("points")) {
-        for (const auto& point : entry.at("points")) f.points.push_back(triple_of(point));
-      }
-      if (entry.contains("triangles"))
-        f.triangles = entry.at("triangles").get<std::vector<std::array<std::uint32_t, 3>>>();
+      for (const auto& point : entry.value("points", nlohmann::json::array()))
+        f.points.push_back(triple_of(point));
+      f.triangles = entry.value("triangles", f.triangles);
       for (const FixtureInfo& row : fixture_table()) {
         if (entry.contains(row.name))
           set_parameter(f.numbers, row.name, entry.at(std::string(row.name)).get<double>());

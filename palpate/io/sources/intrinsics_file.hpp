@@ -12,16 +12,8 @@
 
 namespace palpate {
 
-/// The depth camera of a recording: the content of an `intrinsics.json`,
-///
-///     {"width": 640, "height": 480, "fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5,
-///      "depth_units_per_metre": 5000, "distortion": null, "invalid_value": 0,
-///      "saturated_value": 65535, "fps_nominal": 30, "sensor_kind": "stereo"}
-///
-/// The keys after depth_units_per_metre may be left out or null; `sensor_kind` is `stereo`,
-/// `structured light` or `time of flight`. `distortion` is an object
-/// of k1..k6, p1, p2 (Brown-Conrady, those left out are 0), which may also be called
-/// `distortion_brown_conrady_k1_6_p`. Keys not named here are notes and are passed over.
+/// The depth camera of a recording: the content of an `intrinsics.json`, whose keys docs/sources.md
+/// describes.
 struct RecordedCamera {
   Intrinsics intrinsics;
   double units_per_metre = 1000.0;

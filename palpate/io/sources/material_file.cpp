@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdio>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -36,13 +37,9 @@ std::optional<Colour> colour_of(std::string_view text) {
 }
 
 std::string colour_text(const Colour& colour) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string text = "#";
-  for (const std::uint8_t value : colour) {
-    text += digits[value >> 4U];
-    text += digits[value & 15U];
-  }
-  return text;
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "#%02x%02x%02x", colour[0], colour[1], colour[2]);
+  return text.data();
 }
 
 NamedMaterial read_material(const TomlTable& root, const toml::node& node,

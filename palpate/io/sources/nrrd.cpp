@@ -125,8 +125,8 @@ void take_values(Volume& volume, const std::byte* at, double level) {
 }
 
 // Surface nets: in each cell of eight voxels that the surface passes, a point in the middle of
-// where it crosses the cell's edges; about each crossed edge, a face through the points of the four
-// cells there.
+// where it crosses the cell's edges; about each crossed edge, a face through its four cells'
+// points.
 class SurfaceNet {
  public:
   SurfaceNet(const Volume& volume, PointFile& mesh) : volume_(volume), mesh_(mesh) {

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-
 #include <array>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "palpate/io/sources/bag_camera.hpp"
-#include "palpate/io/sources/depth_recording.hpp"
 #include "palpate/io/sources/material_file.hpp"
-#include "palpate/io/sources/point_file_source.hpp"
+#include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/source.hpp"
-#include "palpate/io/sources/synthetic_camera.hpp"
-#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -21,6 +16,78 @@
 #include "palpate/kernel/core/uri.hpp"
 
 namespace palpate {
+namespace {
+
+class PosedSource final : public Source {
+ public:
+  PosedSource(std::unique_ptr<Source> source, const Eigen::Isometry3d& pose, std::string uri)
+      : source_(std::move(source)), pose_(pose), uri_(std::move(uri)) {
+    look_at_info();
+  }
+
+  std::optional<Frame> next(double timeout) override {
+    std::optional<Frame> frame = source_->next(timeout);
+    look_at_info();
+    if (!frame) return frame;
+    if (frame->colour && frame->colour->camera)
+      frame->colour = posed(*frame->colour, *frame->cloud);
+    frame->cloud = posed(*frame->cloud);
+    return frame;
+  }
+  std::size_t skip(std::size_t count) override { return source_->skip(count); }
+  void cancel() noexcept override { source_->cancel(); }
+  void follow(const Vec3& hand) override { source_->follow(hand); }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  // Its details change from frame to frame.
+  void look_at_info() {
+    info_ = source_->info();
+    if (uri_.empty()) return;
+    info_.uri = uri_;
+    info_.notes.emplace_back("the camera pose is set by ?pose=; other poses are ignored");
+  }
+  // A colour camera stays where it is beside the depth camera.
+  [[nodiscard]] std::shared_ptr<const ColourImage> posed(const ColourImage& colour,
+                                                         const Cloud& cloud) const {
+    auto moved = std::make_shared<ColourImage>(colour);
+    Eigen::Isometry3d world_from_depth = Eigen::Isometry3d::Identity();
+    if (const DepthImage* image = cloud.image()) world_from_depth = image->world_from_camera();
+    moved->camera->world_from_camera =
+        pose_ * world_from_depth.inverse() * colour.camera->world_from_camera;
+    return moved;
+  }
+  [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) const {
+    if (const DepthImage* image = cloud.image()) {
+      auto moved = std::make_shared<DepthImage>(*image);
+      moved->set_world_from_camera(pose_);
+      return moved;
+    }
+    const PointCloud* points = cloud.point_cloud();
+    if (points == nullptr)
+      throw Error(info().uri, "its frames are neither depth images nor points",
+                  "remove the camera pose");
+    std::optional<Vec3> viewpoint = points->viewpoint();
+    if (viewpoint) viewpoint = pose_ * *viewpoint;
+    if (const Surface* surface = points->surface()) {
+      Surface moved = *surface;
+      for (Vec3& point : moved.points) point = pose_ * point;
+      for (Vec3& normal : moved.normals) normal = pose_.linear() * normal;
+      return std::make_shared<PointCloud>(std::move(moved), viewpoint);
+    }
+    std::vector<Vec3> moved;
+    moved.reserve(points->size());
+    for (std::size_t i = 0; i < points->size(); ++i) moved.push_back(pose_ * points->point(i));
+    return std::make_shared<PointCloud>(moved, viewpoint);
+  }
+
+  std::unique_ptr<Source> source_;
+  Eigen::Isometry3d pose_;
+  std::string uri_;
+  SourceInfo info_;
+};
+
+}  // namespace
 
 std::string_view name_of(StampClock clock) noexcept {
   constexpr std::array<std::string_view, 5> names{"recording", "monotonic", "system", "sensor",
@@ -34,16 +101,6 @@ SensorKind sensor_option(const Uri& uri, SensorKind known) {
   if (const std::optional<SensorKind> kind = sensor_named(name)) return *kind;
   throw Error(uri.text(), "option 'sensor' is '" + name + "'",
               "give stereo, structured-light, time-of-flight or unknown");
-}
-
-std::size_t Source::skip(std::size_t /*count*/) { return 0; }
-
-void Source::cancel() noexcept {}
-
-void Source::follow(const Vec3& /*hand*/) {}
-
-bool Source::place(const Eigen::Isometry3d& /*world_from_source*/, const std::string& /*uri*/) {
-  return false;
 }
 
 const Registry<SourceScheme>& standard_sources() {
@@ -125,78 +182,6 @@ std::unique_ptr<Source> open_source(std::string_view text, const Registry<Source
   if (pose) source = with_pose(std::move(source), *pose, uri.text());
   return materials ? with_materials(std::move(source), std::move(*materials)) : std::move(source);
 }
-namespace {
-
-class PosedSource final : public Source {
- public:
-  PosedSource(std::unique_ptr<Source> source, const Eigen::Isometry3d& pose, std::string uri)
-      : source_(std::move(source)), pose_(pose), uri_(std::move(uri)) {
-    look_at_info();
-  }
-
-  std::optional<Frame> next(double timeout) override {
-    std::optional<Frame> frame = source_->next(timeout);
-    look_at_info();
-    if (!frame) return frame;
-    if (frame->colour && frame->colour->camera)
-      frame->colour = posed(*frame->colour, *frame->cloud);
-    frame->cloud = posed(*frame->cloud);
-    return frame;
-  }
-  std::size_t skip(std::size_t count) override { return source_->skip(count); }
-  void cancel() noexcept override { source_->cancel(); }
-  void follow(const Vec3& hand) override { source_->follow(hand); }
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
-
- private:
-  // Its details change from frame to frame.
-  void look_at_info() {
-    info_ = source_->info();
-    if (uri_.empty()) return;
-    info_.uri = uri_;
-    info_.notes.emplace_back("the camera pose is set by ?pose=; other poses are ignored");
-  }
-  // A colour camera stays where it is beside the depth camera.
-  [[nodiscard]] std::shared_ptr<const ColourImage> posed(const ColourImage& colour,
-                                                         const Cloud& cloud) const {
-    auto moved = std::make_shared<ColourImage>(colour);
-    Eigen::Isometry3d world_from_depth = Eigen::Isometry3d::Identity();
-    if (const DepthImage* image = cloud.image()) world_from_depth = image->world_from_camera();
-    moved->camera->world_from_camera =
-        pose_ * world_from_depth.inverse() * colour.camera->world_from_camera;
-    return moved;
-  }
-  [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) const {
-    if (const DepthImage* image = cloud.image()) {
-      auto moved = std::make_shared<DepthImage>(*image);
-      moved->set_world_from_camera(pose_);
-      return moved;
-    }
-    const PointCloud* points = cloud.point_cloud();
-    if (points == nullptr)
-      throw Error(info().uri, "its frames are neither depth images nor points",
-                  "remove the camera pose");
-    std::optional<Vec3> viewpoint = points->viewpoint();
-    if (viewpoint) viewpoint = pose_ * *viewpoint;
-    if (const Surface* surface = points->surface()) {
-      Surface moved = *surface;
-      for (Vec3& point : moved.points) point = pose_ * point;
-      for (Vec3& normal : moved.normals) normal = pose_.linear() * normal;
-      return std::make_shared<PointCloud>(std::move(moved), viewpoint);
-    }
-    std::vector<Vec3> moved;
-    moved.reserve(points->size());
-    for (std::size_t i = 0; i < points->size(); ++i) moved.push_back(pose_ * points->point(i));
-    return std::make_shared<PointCloud>(moved, viewpoint);
-  }
-
-  std::unique_ptr<Source> source_;
-  Eigen::Isometry3d pose_;
-  std::string uri_;
-  SourceInfo info_;
-};
-
-}  // namespace
 
 std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,
                                   const Eigen::Isometry3d& world_from_camera, std::string uri) {

@@ -88,8 +88,7 @@ const Scalar* type_of(const Cursor& file, std::string_view type, std::string_vie
   return found;
 }
 
-// Puts a packed colour, 0xAARRGGBB, where it goes. Nothing depends on a colour: one that is no
-// number is black.
+// Puts a packed colour, 0xAARRGGBB, where it goes; one that is no number is black.
 void set_colour(std::vector<std::uint8_t>& colours, std::size_t point, double value) {
   const auto packed = static_cast<std::int64_t>(std::abs(value) < 0x1p53 ? value : 0.0);
   for (std::size_t channel = 0; channel < 3; ++channel)

@@ -46,12 +46,9 @@ struct PointFile {
   /// red, green and blue, of bytes or of floats from 0 to 1, a splat's spherical harmonics of
   /// degree 0. Empty without.
   std::vector<std::uint8_t> colours;
-  /// Position of the camera in the frame of the points: the translation of PCD's
-  /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.
-  ///
-  /// PCL keeps points as they are stored and takes the viewpoint to be in the same frame (its
-  /// normals are turned towards it), though its viewer moves the points by it. Here too
-  /// nothing is transformed, and the orientation is not used.
+  /// Position of the camera in the frame of the points: the translation of PCD's VIEWPOINT, or
+  /// view_px view_py view_pz of the `camera` element that PCL writes into a PLY. As in PCL, but not
+  /// its viewer, nothing is transformed by it, and the orientation is not used.
   std::optional<Vec3> viewpoint;
   std::optional<SplatColumns> splat;  ///< of a splat that is read as one
   std::string encoding;               ///< as in the header, e.g. "binary_compressed"
@@ -62,27 +59,24 @@ struct PointFile {
   std::size_t bytes_unread = 0;
 };
 
-/// Reads a file by a parser of bytes in memory, of which `name` is what an error calls them.
-/// @param largest  [bytes] larger files are refused
-/// @throws Error as the parser, or if it cannot be read.
+// All parsers take bytes in memory, of which `name` is what an error calls them, allocate in
+// proportion to their size, whatever a header declares, and throw an Error that names the file, the
+// line or offset, and what was wrong.
+
+/// Reads a file by a parser.
+/// @param largest  [bytes] larger files are refused  @throws Error also if it cannot be read.
 PointFile read_by(PointFile (*parse)(std::span<const std::byte> bytes, std::string_view name),
                   const std::filesystem::path& path,
                   std::uintmax_t largest = std::uintmax_t{1} << 32U);
 
 /// Reads a PCD file, versions 0.5 to 0.7: ascii, binary (little endian) or binary_compressed;
 /// fields of any order, type, size and count, as long as x, y and z are among them.
-///
-/// Allocates in proportion to the size of the file, whatever its header declares.
-/// @throws Error naming the file, the line or offset, and what was wrong.
 PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
 inline PointFile read_pcd(const std::filesystem::path& path) { return read_by(parse_pcd, path); }
 
 /// Reads a PLY file, version 1.0: ascii, little or big endian. Of element `vertex` x, y, z and
 /// nx, ny, nz and red, green, blue; of `face` and `tristrips` vertex_indices or vertex_index; of
 /// `camera` its position. Other elements, lists and properties are checked and passed over.
-///
-/// Allocates in proportion to the size of the file, whatever its header declares.
-/// @throws Error naming the file, the line or offset, and what was wrong.
 PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
 inline PointFile read_ply(const std::filesystem::path& path) { return read_by(parse_ply, path); }
 
@@ -98,23 +92,17 @@ bool holds_splat(const std::filesystem::path& path);
 
 /// Reads an STL file, binary or ascii, into `points` and `triangles`. Corners at the same place are
 /// one point. Normals and attributes are passed over.
-///
-/// Allocates in proportion to the size of the file, whatever its header declares.
-/// @throws Error naming the file and what was wrong
 PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name);
 inline PointFile read_stl(const std::filesystem::path& path) {
   return read_by(parse_stl, path, std::uintmax_t{1} << 28U);
 }
 
 /// Reads a Wavefront OBJ's `v` and `f` into `points` and `triangles`; polygons are fanned. All else
-/// is passed over. @throws Error naming the file, the line, and what was wrong
+/// is passed over.
 PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name);
 inline PointFile read_obj(const std::filesystem::path& path) { return read_by(parse_obj, path); }
 
 /// Reads an SPZ of versions 1 to 4 as read_splat does a PLY.
-///
-/// Allocates in proportion to the size of the file, whatever its header declares.
-/// @throws Error naming the file and what was wrong
 PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name);
 inline PointFile read_spz(const std::filesystem::path& path) {
   return read_by(parse_spz, path, std::uintmax_t{1} << 31U);
@@ -124,7 +112,6 @@ inline PointFile read_spz(const std::filesystem::path& path) {
 bool is_gltf(const std::filesystem::path& path);
 /// Reads a glTF 2.0 or GLB: the triangles of its scene or, `as_splat`, the Gaussians of its
 /// KHR_gaussian_splatting, each moved by its nodes. Buffers are inside, or files beside or below.
-/// @throws Error naming the file and what was wrong
 PointFile read_gltf(const std::filesystem::path& path, bool as_splat);
 /// The same for bytes in memory. @param folder  of the buffers
 PointFile parse_gltf(std::span<const std::byte> bytes, std::string_view name,
@@ -133,12 +120,8 @@ PointFile parse_gltf(std::span<const std::byte> bytes, std::string_view name,
 /// Is a file, by its name, an NRRD?
 bool is_nrrd(const std::filesystem::path& path);
 /// Reads an NRRD's volume, raw or gzip, behind its header or in a file beside or below, and makes
-/// triangles of where its values pass `level`, by surface nets. An edge between two voxels is
-/// crossed if one of them is below the level, the other is not, and both were seen. Unseen are
-/// values that are not finite and, at level 0, those of the largest size, where a TSDF ends.
-///
-/// Allocates in proportion to the size of the file, whatever its header declares.
-/// @throws Error naming the file and what was wrong, also if there is no such place.
+/// triangles of where its values pass `level`, by surface nets (docs/sources.md).
+/// @throws Error also if there is no such place.
 PointFile read_nrrd(const std::filesystem::path& path, double level = 0.0);
 /// The same for bytes in memory. @param folder  of the data
 PointFile parse_nrrd(std::span<const std::byte> bytes, std::string_view name,

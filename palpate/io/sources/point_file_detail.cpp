@@ -31,7 +31,7 @@ constexpr std::string_view blanks = " \t\r\n\v\f";
 
 // The whole token as a number of that type; none if it is no number in range.
 template <class T>
-std::optional<T> to_whole(std::string_view token) noexcept {
+std::optional<T> number_in(std::string_view token) noexcept {
   T value = 0;
   const char* const end = token.data() + token.size();
   const auto [stop, error] = std::from_chars(token.data(), end, value);
@@ -66,13 +66,13 @@ void read_line(Cursor& file, std::span<const Column> columns, std::size_t row,
       continue;
     }
     const std::string_view token = next();
-    const auto length = to_whole<std::uint64_t>(token);
+    const auto length = number_in<std::uint64_t>(token);
     if (!length) file.fail_in_line("a list's length is " + quoted(token), "correct the line");
     list.clear();
     for (std::uint64_t k = 0; k < *length; ++k) {
       const std::string_view text = next();
       if (!column.put_list) continue;
-      const auto value = to_whole<std::int64_t>(text);
+      const auto value = number_in<std::int64_t>(text);
       if (!value)
         file.fail_in_line(
             "one of " + std::string(column.name) + " is " + quoted(text) + ", not a whole number",
@@ -132,13 +132,9 @@ std::string_view next_token(std::string_view& rest) noexcept {
 }
 
 std::optional<double> to_number(std::string_view token) noexcept {
-  if (token.size() > 1 && token[0] == '+' && token[1] != '-') {
+  if (token.size() > 1 && token[0] == '+' && token[1] != '-')
     token.remove_prefix(1);  // which from_chars does not know
-  }
-  double value = 0.0;
-  const char* const end = token.data() + token.size();
-  const auto [stop, error] = std::from_chars(token.data(), end, value);
-  return error == std::errc{} && stop == end ? std::optional(value) : std::nullopt;
+  return number_in<double>(token);
 }
 
 std::vector<double> to_numbers(std::string list, std::size_t count) {
@@ -155,15 +151,13 @@ std::vector<double> to_numbers(std::string list, std::size_t count) {
 }
 
 std::optional<std::uint64_t> to_count(std::string_view token) noexcept {
-  return to_whole<std::uint64_t>(token);
+  return number_in<std::uint64_t>(token);
 }
 
 std::string quoted(std::string_view piece) {
   constexpr std::size_t longest = 40;
   std::string text = "\"";
-  for (const char c : piece.substr(0, longest)) {
-    text += c >= ' ' && c <= '~' ? c : '?';
-  }
+  for (const char c : piece.substr(0, longest)) text += c >= ' ' && c <= '~' ? c : '?';
   return text + (piece.size() > longest ? "...\"" : "\"");
 }
 
@@ -185,24 +179,18 @@ std::size_t Cursor::left_after_blanks() const noexcept {
 }
 
 std::optional<std::string_view> Cursor::next_line() noexcept {
-  if (left() == 0) {
-    return std::nullopt;
-  }
+  if (left() == 0) return std::nullopt;
   const std::string_view rest(reinterpret_cast<const char*>(bytes_.data()) + at_, left());
   std::string_view line = rest.substr(0, rest.find('\n'));
   at_ += std::min(line.size() + 1, rest.size());
   ++line_;
-  if (line.ends_with('\r')) {
-    line.remove_suffix(1);
-  }
+  if (line.ends_with('\r')) line.remove_suffix(1);
   return line;
 }
 
 std::optional<std::string_view> Cursor::next_full_line() noexcept {
   auto line = next_line();
-  while (line && line->find_first_not_of(blanks) == std::string_view::npos) {
-    line = next_line();
-  }
+  while (line && line->find_first_not_of(blanks) == std::string_view::npos) line = next_line();
   return line;
 }
 

@@ -78,8 +78,7 @@ const Scalar* find_scalar(const Is& is) {
 
 /// The whole token as a number, "nan" and "inf" included; none if it is no number in range.
 [[nodiscard]] std::optional<double> to_number(std::string_view token) noexcept;
-/// The numbers of a list, in which commas and brackets separate, too. Empty unless there are
-/// `count`, all of them finite.
+/// The numbers of a list by blanks, commas and brackets; empty unless they are `count` finite ones.
 [[nodiscard]] std::vector<double> to_numbers(std::string list, std::size_t count);
 [[nodiscard]] std::optional<std::uint64_t> to_count(std::string_view token) noexcept;
 
@@ -167,8 +166,7 @@ void ask_for(Column& column, std::vector<Vec3>& points, std::size_t axis);
 /// Makes room for what was asked for.
 void prepare(std::span<const Column> columns, std::size_t rows);
 
-/// Gives a column the values of some rows, the first at `first` and each `stride` bytes behind the
-/// one before.
+/// Gives a column the values of some rows, `stride` bytes apart.
 void take_column(const Column& column, const std::byte* first, std::size_t stride, std::size_t rows,
                  std::endian order, std::size_t first_row = 0);
 

@@ -12,9 +12,7 @@ namespace palpate {
 
 /// The lens of a RealSense camera as librealsense describes it, live and in its recordings.
 struct RealSenseLens {
-  int width = 0, height = 0;       ///< [px]
-  double ppx = 0.0, ppy = 0.0;     ///< [px] principal point
-  double fx = 0.0, fy = 0.0;       ///< [px]
+  Intrinsics pinhole;              ///< without the distortion
   std::string model = "None";      ///< of the distortion: "Brown Conrady", ...
   std::array<double, 5> coeffs{};  ///< k1 k2 p1 p2 k3
 };

@@ -32,24 +32,25 @@ std::uint16_t quantised(double metres, double units) {
   return raw >= 1.0 && raw < 65535.0 ? static_cast<std::uint16_t>(raw) : std::uint16_t{0};
 }
 
-// Byte offsets of x, y and z in a point, and whether they are doubles.
-struct AxisFields {
-  std::array<std::size_t, 3> offset{};
-  std::array<bool, 3> is_double{};
+// Where in a point x, y or z is, and of which type.
+struct AxisField {
+  std::size_t offset = 0;  // [bytes]
+  const detail::Scalar* type = nullptr;
 };
 
-AxisFields axis_fields_of(const ros::PointCloud2& message, const std::string& name) {
-  constexpr std::array<std::string_view, 3> wanted{"x", "y", "z"};
-  AxisFields axes;
-  for (std::size_t axis = 0; axis < wanted.size(); ++axis) {
+std::array<AxisField, 3> axis_fields_of(const ros::PointCloud2& message, const std::string& name) {
+  std::array<AxisField, 3> axes;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::string wanted(1, "xyz"[axis]);
     const auto field = std::find_if(message.fields.begin(), message.fields.end(),
-                                    [&](const auto& f) { return f.name == wanted[axis]; });
+                                    [&](const auto& f) { return f.name == wanted; });
     if (field == message.fields.end() || (field->datatype != float32 && field->datatype != float64))
-      throw Error(name, "has no field " + std::string(wanted[axis]) + " of float32 or float64",
+      throw Error(name, "has no field " + wanted + " of float32 or float64",
                   "name another topic with ?topic=");
-    axes.offset[axis] = field->offset;
-    axes.is_double[axis] = field->datatype == float64;
-    if (axes.offset[axis] + (axes.is_double[axis] ? 8 : 4) > message.point_step)
+    const std::string_view type = field->datatype == float64 ? "float64" : "float32";
+    axes[axis] = {field->offset,
+                  detail::find_scalar([&](const auto& s) { return s.name == type; })};
+    if (axes[axis].offset + axes[axis].type->size > message.point_step)
       throw Error(name, "has fields beyond the end of a point", "it may be damaged");
   }
   return axes;
@@ -76,8 +77,7 @@ void check_size(const ros::Image& image, std::size_t size, const std::string& na
       image.height > largest_side || image.step < image.width * size ||
       image.data.size() / image.height < image.step)
     throw Error(name,
-                "is an image of " + std::to_string(image.width) + "x" +
-                    std::to_string(image.height) + " pixels in " +
+                "is an image of " + size_text(image.width, image.height) + " pixels in " +
                     std::to_string(image.data.size()) + " bytes, which do not fit",
                 "it may be damaged");
 }
@@ -132,7 +132,7 @@ ros::Image unpacked(ros::CompressedImage message, double units, const std::strin
 void read_points(const ros::PointCloud2& message, const std::string& name, RosFrame& frame) {
   std::vector<Vec3>& points = frame.points.emplace();
   if (message.width == 0 || message.height == 0) return;
-  const AxisFields axes = axis_fields_of(message, name);
+  const auto axes = axis_fields_of(message, name);
   const std::size_t row = std::size_t{message.width} * message.point_step;
   if (message.height > 1 && message.row_step < row)
     throw Error(name, "has rows that overlap", "it may be damaged");
@@ -151,12 +151,9 @@ void read_points(const ros::PointCloud2& message, const std::string& name, RosFr
     for (std::size_t u = 0; u < message.width; ++u) {
       const std::byte* const at = &message.data[v * row_step + u * message.point_step];
       Vec3& point = points.emplace_back();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::byte* const place = at + axes.offset[axis];
-        point[static_cast<Eigen::Index>(axis)] = axes.is_double[axis]
-                                                     ? detail::load<double>(place, order)
-                                                     : double{detail::load<float>(place, order)};
-      }
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        point[static_cast<Eigen::Index>(axis)] =
+            axes[axis].type->value(at + axes[axis].offset, order);
       if (colour == message.fields.end()) continue;
       const auto packed = detail::load<std::uint32_t>(at + colour->offset, order);
       for (const unsigned shift : {16U, 8U, 0U})
@@ -281,11 +278,8 @@ bool is_depth_slice(const ros::CompressedImage& message) {
 
 std::shared_ptr<ColourImage> RosFrame::colour() const {
   if (rgb.empty()) return nullptr;
-  auto image = std::make_shared<ColourImage>();
-  image->width = static_cast<int>(width);
-  image->height = static_cast<int>(height);
-  image->rgb = rgb;
-  return image;
+  return std::make_shared<ColourImage>(
+      ColourImage{static_cast<int>(width), static_cast<int>(height), rgb});
 }
 
 RosFrame ros_frame_of(std::string_view type, std::span<const std::byte> cdr,

@@ -15,8 +15,7 @@
 #include "palpate/kernel/cloud/frame.hpp"
 #include "palpate/kernel/cloud/organised.hpp"
 
-// What ROS 2's messages of cameras hold, the same from a bag and from the network. `name` is the
-// message's, for errors.
+// What ROS 2's messages of cameras hold. `name` is the message's, for errors.
 namespace palpate {
 
 constexpr std::uint32_t largest_side = 16384;  ///< [px] of an image

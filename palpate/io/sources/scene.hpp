@@ -68,9 +68,8 @@ class Scene {
   [[nodiscard]] std::optional<double> cast(const Vec3& origin, const Vec3& direction,
                                            double t) const;
 
-  /// The surface nearest to a point. Outside of all parts it is exact; where parts overlap, a point
-  /// inside gets the surface of the part that it is deepest in, so that its depth is never
-  /// overstated.
+  /// The surface nearest to a point, exact outside of all parts; inside, that of the part that the
+  /// point is deepest in.
   [[nodiscard]] SurfacePoint nearest(const Vec3& point, double t) const;
   [[nodiscard]] double signed_distance(const Vec3& point, double t) const {
     return nearest(point, t).distance;
@@ -82,17 +81,14 @@ class Scene {
 
 /// The scene that a URI's path names, with its options: `synthetic:sphere?radius=40mm&speed=0.1`.
 ///
-/// Besides its own options every scene takes those of Motion (start, speed, acceleration, stroke,
-/// frequency, swing) for the part that its summary names, or for all of it, and `floor`, the depth
-/// of a resting plane beneath [m]. Other options of the URI are ignored (docs/synthetic.md).
+/// docs/synthetic.md has the options; others of the URI are ignored.
 /// @throws Error for an unknown scene, naming the known ones, or a value out of range.
 Scene make_scene(const Uri& uri);
 
 /// A scene with a name.
 struct SceneInfo {
   std::string_view name;
-  std::string_view summary;                   ///< what it is, one line
-  std::span<const std::string_view> options;  ///< its own, besides those of every scene
+  std::string_view summary;  ///< what it is, one line
 };
 
 /// All named scenes.

@@ -150,8 +150,7 @@ void blank_grazing_row(const Intrinsics& camera, double least_cosine, int v, con
 }
 
 // The D4xx's noise is what a block matcher makes: an average over a window, which correlates as a
-// triangle, and a little of each pixel's own. Fitted to the deviations of eight frames of a resting
-// table, by depth.
+// triangle, and a little of each pixel's own. Fitted to eight frames of a resting table, by depth.
 struct D4xxNoise {
   double depth;               // [m]
   double sigma;               // [m]

@@ -35,12 +35,6 @@ Nearest about(const Vec3& centre, double radius, const Vec3& point) {
   return {distance - radius, centre + radius * normal, normal};
 }
 
-double cast_ball(const Vec3& centre, double radius, const Vec3& origin, const Vec3& direction) {
-  const Vec3 offset = origin - centre;
-  return first_root(direction.squaredNorm(), direction.dot(offset),
-                    offset.squaredNorm() - radius * radius);
-}
-
 // The point of an outline, in the x-z plane, that is nearest to a given one.
 struct Nearest2 {
   double distance;
@@ -172,7 +166,8 @@ double cast_on(const HalfSpace& /*shape*/, const Vec3& origin, const Vec3& direc
 }
 
 double cast_on(const Sphere& shape, const Vec3& origin, const Vec3& direction) {
-  return cast_ball(Vec3::Zero(), shape.radius, origin, direction);
+  return first_root(direction.squaredNorm(), direction.dot(origin),
+                    origin.squaredNorm() - shape.radius * shape.radius);
 }
 
 // The first of both roots of the round side that lies between the ends.

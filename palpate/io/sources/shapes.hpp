@@ -29,8 +29,7 @@ struct Cylinder {
   double radius, half_length;
 };
 
-/// A polygon in the x-z plane, stretched along y from -half_length to half_length (may be
-/// infinite).
+/// A polygon in the x-z plane, stretched along y from -half_length to half_length, even infinite.
 struct Prism {
   std::vector<Eigen::Vector2d> outline;  ///< (x, z), counter-clockwise, without crossings
   double half_length;

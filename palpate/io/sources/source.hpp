@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -60,8 +62,7 @@ struct SourceInfo {
   std::shared_ptr<const Body> body{};  ///< what a virtual camera looks at
 };
 
-/// Where frames come from: a camera, a simulation, a recording. Used on one thread, except for
-/// `cancel`.
+/// Where frames come from: a camera, a simulation, a recording. Used on one thread, but `cancel`.
 ///
 /// A camera of your own is a class derived from this. To open it by a URI, add a SourceScheme to a
 /// copy of standard_sources().
@@ -83,21 +84,40 @@ class Source {
 
   /// Leaves out up to `count` frames without decoding them, for a reader that is too slow.
   /// @return how many were left out; 0 where the source cannot, or at the end
-  virtual std::size_t skip(std::size_t count);
+  virtual std::size_t skip(std::size_t /*count*/) { return 0; }
 
   /// Makes a `next` that waits return soon, and all later ones at once, without a frame. Any
   /// thread; returns at once. A source that never waits need not override it.
-  virtual void cancel() noexcept;
+  virtual void cancel() noexcept {}
 
   /// Where the hand is [m, world], for a source that looks where it goes; called before `next`.
-  virtual void follow(const Vec3& hand);
+  virtual void follow(const Vec3& /*hand*/) {}
 
   /// Puts what a source of its own frame shows elsewhere, where poses of a camera mean nothing.
   /// @param uri  the source's from now on; empty: its own
   /// @return false: it is none such, its frames have poses
-  virtual bool place(const Eigen::Isometry3d& world_from_source, const std::string& uri);
+  virtual bool place(const Eigen::Isometry3d& /*world_from_source*/, const std::string& /*uri*/) {
+    return false;
+  }
 
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
+};
+
+/// A recording or simulation, whose frames have numbers, from 0 up to SourceInfo::frames.
+class NumberedSource : public Source {
+ public:
+  std::size_t skip(std::size_t count) override {
+    const std::size_t skipped = info_.frames ? std::min(count, *info_.frames - next_) : count;
+    next_ += skipped;
+    return skipped;
+  }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ protected:
+  explicit NumberedSource(SourceInfo info) : info_(std::move(info)) {}
+
+  SourceInfo info_;
+  std::size_t next_ = 0;  // number of the frame that comes next
 };
 
 /// One kind of source that a URI can name.
@@ -111,6 +131,21 @@ struct SourceScheme {
 /// The library's own: `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`,
 /// `ply:FILE|DIR`, `map:FILE`, `splat:FILE`, `recording:BAG`. To add to them, copy the registry.
 const Registry<SourceScheme>& standard_sources();
+
+/// What opens them; docs/sources.md has their options.
+/// @throws Error if there is no such file or folder, or none that can be used, or an option is not
+///         known or out of range.
+std::unique_ptr<Source> open_synthetic(const Uri& uri);
+std::unique_ptr<Source> open_point_files(const Uri& uri);
+std::unique_ptr<Source> open_map(const Uri& uri);
+std::unique_ptr<Source> open_splat(const Uri& uri);
+std::unique_ptr<Source> open_tum(const Uri& uri);
+std::unique_ptr<Source> open_depth(const Uri& uri);
+std::unique_ptr<Source> open_recording(const Uri& uri);
+
+/// The URI of a source whose lengths are `times` as long as those of this one; empty: it is neither
+/// of point files nor a body, which have an option for that.
+std::string rescaled(const std::string& uri, double times);
 
 /// The kind of camera that a recording's option `sensor` names; without it, `known`.
 /// @throws Error for another word.
@@ -127,17 +162,15 @@ std::string source_uri(const std::string& text,
                        const Registry<SourceScheme>& schemes = standard_sources());
 
 /// Opens a source by its URI. Whatever the scheme, `pose=x,y,z,qx,qy,qz,qw` says where the camera
-/// stands, as parse_pose reads it: see with_pose(); `scale_reference=plane:NX,NY,NZ,D` or
-/// `scale_reference=points:X,Y,Z;X,Y,Z;X,Y,Z` brings its depths to metres: see
-/// with_scale_reference(); and `material=NAME` or `material=FILE.toml` says what its surfaces are
-/// made of: see with_materials().
+/// stands, as parse_pose reads it: see with_pose(); `scale_reference=` brings its depths to metres:
+/// see with_scale_reference(); and `material=NAME` or `material=FILE.toml` says what its surfaces
+/// are made of: see with_materials().
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that
 ///         cannot be used.
 std::unique_ptr<Source> open_source(std::string_view uri,
                                     const Registry<SourceScheme>& schemes = standard_sources());
 
 /// A source whose camera stands elsewhere than the source says: every frame's pose is replaced.
-///
 /// A source that can `place` itself does. Of others, depth images get the pose as their
 /// world_from_camera; points and their viewpoint, which are in the world already, are moved by it.
 /// Copies each frame, on the camera's thread.
@@ -147,14 +180,10 @@ std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,
                                   const Eigen::Isometry3d& world_from_camera, std::string uri = {});
 
 /// A source of depth images without a scale of their own, as a network makes them, brought to
-/// metres by a plane or points whose place is known.
-///
-/// In each frame, readings within 5 % of the reference under the present scale are taken for it;
-/// the median of true over read depth, smoothed over 0.1 s, is the scale of the whole image. It is
-/// in doubt (Cloud::scale_unsure) until the reference was seen for 0.5 s, and when it was not for
-/// 0.2 s: too few pixels, or too wide a spread. A pose that it is given acts before the reference.
-/// @param reference  `plane:NX,NY,NZ,D`, all places p with n . p = D, or `points:X,Y,Z;X,Y,Z;X,Y,Z`
-///                   [m, world]
+/// metres by a plane or points whose place is known (docs/sources.md). Where the scale is in doubt,
+/// so says Cloud::scale_unsure. A pose that it is given acts before the reference.
+/// @param reference  [m, world] `plane:NX,NY,NZ,D`, all places p with n . p = D, or
+///                   `points:X,Y,Z;X,Y,Z;X,Y,Z`
 /// @param uri        the source's, for messages
 /// @throws Error if the reference cannot be read; from next(), if frames are no depth images
 std::unique_ptr<Source> with_scale_reference(std::unique_ptr<Source> source,

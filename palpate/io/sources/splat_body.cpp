@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/io/sources/splat_body.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "palpate/io/sources/point_file.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
 #include "palpate/kernel/core/vectorise.hpp"
@@ -85,8 +84,7 @@ struct Gathered {
   std::vector<float> sum;     // [m] depths of it, weighted by these
 };
 
-// Pixels [u_begin, u_end) x [v_begin, v_end), and the rays of their first, from the mean's, to
-// them.
+// Pixels [u_begin, u_end) x [v_begin, v_end), and the ray of the first, from the mean's.
 struct Pixels {
   int u_begin, u_end, v_begin, v_end, width;
   float a, b, step_a, step_b;

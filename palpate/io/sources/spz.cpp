@@ -84,8 +84,7 @@ double of_half(std::uint16_t half) {
   return exponent == 31 ? NAN : (half & 0x8000U) != 0 ? -size : size;
 }
 
-// x, y, z, w of the three smallest components: 2 bits say which is left out, then 10 each, of which
-// the first is the sign.
+// x, y, z, w of the three smallest: 2 bits say which is left out, then 10 each, a sign the first.
 Eigen::Vector4d smallest_three(std::uint32_t bits) {
   Eigen::Vector4d q = Eigen::Vector4d::Zero();
   const auto largest = static_cast<Eigen::Index>(bits >> 30U);

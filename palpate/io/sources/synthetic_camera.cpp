@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <string>
 
+#include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
@@ -26,28 +26,19 @@ Pair pair_option(const Uri& uri, std::string_view key, Pair fallback, double min
                  bool one_is_enough) {
   if (!uri.has(key)) return fallback;
   const std::string text = uri.text_option(key, "");
-  const char* const end = text.data() + text.size();
-  Pair pair{};
-  const auto [cross, error] = std::from_chars(text.data(), end, pair.first);
-  bool good = error == std::errc{};
-  if (good && cross == end && one_is_enough) {
-    pair.second = pair.first;
-  } else if (good && cross != end && *cross == 'x') {
-    const auto [rest, second_error] = std::from_chars(cross + 1, end, pair.second);
-    good = second_error == std::errc{} && rest == end;
-  } else {
-    good = false;
-  }
-  const auto fits = [&](double value) { return value >= min && value <= max; };
-  if (!good || !fits(pair.first) || !fits(pair.second)) {
-    const auto number = [](double value) { return std::to_string(static_cast<int>(value)); };
-    throw Error(
-        uri.text() + ": option '" + std::string(key) + "'",
-        "'" + text + "' is not two numbers of pixels from " + number(min) + " to " + number(max),
-        "write such as " + std::string(key) + "=" + number(fallback.first) + "x" +
-            number(fallback.second));
-  }
-  return pair;
+  const std::size_t cross = std::min(text.find('x'), text.size());
+  const auto first = detail::to_number(text.substr(0, cross));
+  const auto second = one_is_enough && cross == text.size()
+                          ? first
+                          : detail::to_number(text.substr(std::min(cross + 1, text.size())));
+  const auto fits = [&](const auto& value) { return value && *value >= min && *value <= max; };
+  if (fits(first) && fits(second)) return {*first, *second};
+  const auto number = [](double value) { return std::to_string(static_cast<int>(value)); };
+  throw Error(
+      uri.text() + ": option '" + std::string(key) + "'",
+      "'" + text + "' is not two numbers of pixels from " + number(min) + " to " + number(max),
+      "write such as " + std::string(key) + "=" + number(fallback.first) + "x" +
+          number(fallback.second));
 }
 
 std::uint64_t whole_option(const Uri& uri, std::string_view key, std::uint64_t fallback,
@@ -82,10 +73,10 @@ Eigen::Isometry3d looking_at_origin(double distance, double tilt, double azimuth
 
 SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const SensorModel& sensor,
                                  SourceInfo info)
-    : scene_(std::move(scene)),
+    : NumberedSource(std::move(info)),
+      scene_(std::move(scene)),
       setup_(setup),
       sensor_(sensor, setup.intrinsics),
-      info_(std::move(info)),
       rays_(std::make_shared<const ViewingRays>(setup.intrinsics)),
       directions_(setup.intrinsics.width),
       along_(setup.intrinsics.width) {
@@ -97,16 +88,9 @@ SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const Se
 }
 
 std::optional<Frame> SyntheticCamera::next(double /*timeout*/) {
-  if (setup_.frames && next_frame_ >= *setup_.frames) return std::nullopt;
-  const std::uint64_t frame = next_frame_++;
+  if (setup_.frames && next_ >= *setup_.frames) return std::nullopt;
+  const std::uint64_t frame = next_++;
   return capture(static_cast<double>(frame) / setup_.frame_rate, frame);
-}
-
-std::size_t SyntheticCamera::skip(std::size_t count) {
-  const std::uint64_t left = setup_.frames ? *setup_.frames - next_frame_ : count;
-  const std::uint64_t skipped = std::min<std::uint64_t>(count, left);
-  next_frame_ += skipped;
-  return skipped;
 }
 
 Frame SyntheticCamera::capture(double t, std::uint64_t frame) {

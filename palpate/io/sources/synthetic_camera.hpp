@@ -35,7 +35,7 @@ struct CameraSetup {
 };
 
 /// A depth camera that looks at an analytic scene, so that the true surface of each frame is known.
-class SyntheticCamera final : public Source {
+class SyntheticCamera final : public NumberedSource {
  public:
   /// @throws Error if the set-up or the sensor does not validate.
   SyntheticCamera(Scene scene, const CameraSetup& setup, const SensorModel& sensor,
@@ -43,13 +43,10 @@ class SyntheticCamera final : public Source {
 
   /// Frame k is captured in the instant k / frame_rate, without motion blur.
   std::optional<Frame> next(double timeout = no_timeout) override;
-  std::size_t skip(std::size_t count) override;
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   /// Frame number `frame` as it is at time t [s]; its noise depends on the seed and the number.
   [[nodiscard]] Frame capture(double t, std::uint64_t frame);
-  /// [m] true depth row by row at time t, infinite where there is nothing. Valid until the next
-  /// call of anything here.
+  /// [m] true depth row by row at time t, infinite where there is nothing; until the next call.
   [[nodiscard]] std::span<const float> true_depth(double t);
 
   [[nodiscard]] const Scene& scene() const { return scene_; }
@@ -68,12 +65,10 @@ class SyntheticCamera final : public Source {
   Scene scene_;
   CameraSetup setup_;
   Sensor sensor_;
-  SourceInfo info_;
   std::shared_ptr<const ViewingRays> rays_;
   std::vector<float> resting_, depth_;  // the parts at rest, drawn once; and the newest image
   std::vector<Vec3> directions_;
   std::vector<double> along_;
-  std::uint64_t next_frame_ = 0;
 };
 
 /// What a URI's options say of a camera as open_synthetic_camera takes them, for cameras that see
@@ -83,18 +78,9 @@ CameraSetup camera_setup(const Uri& uri);
 SensorModel camera_sensor(const Uri& uri);
 SensorKind camera_kind(const Uri& uri);
 
-/// `synthetic:SCENE?KEY=VALUE&...`: a scene with its options (make_scene) and
-///   size=640x480 fps=30Hz frames=N fov=57deg distance=0.7m tilt=34deg azimuth=0deg seed=1
-///   brightness=20mm: an image in grey; surfaces are painted with waves along the world's x
-///   colour=20mm: an image in colour; waves of red along x, of green along y, of blue along z
-///   sensor=ideal|d4xx|kinect|tof|learned, and over that noise=1mm noise_grows=0|1
-///   correlation=5 or 5x3 [px] noise_frames=30 drift=3% quantisation=0.1mm disparity_step=3mm
-///   dropouts=1% grazing=80deg flying=30%
-/// Without a scene's name it is the desk.
+/// `synthetic:SCENE?KEY=VALUE&...`: docs/synthetic.md has the options. Without a scene's name it is
+/// the desk.
 /// @throws Error for an unknown scene or option, or a value out of range.
 std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& uri);
-
-/// The same as a SourceScheme opens it.
-std::unique_ptr<Source> open_synthetic(const Uri& uri);
 
 }  // namespace palpate

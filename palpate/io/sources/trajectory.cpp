@@ -60,12 +60,6 @@ void for_each_stamped_line(std::string_view text, const std::string& name, std::
   }
 }
 
-Eigen::Isometry3d pose(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
-  Eigen::Isometry3d world_from_camera(rotation);
-  world_from_camera.translation() = translation;
-  return world_from_camera;
-}
-
 Eigen::Isometry3d parse_matrix(const json& rows, const std::string& where) {
   constexpr const char* remedy = "give four rows of four numbers, a rotation and a translation [m]";
   Eigen::Matrix4d matrix;
@@ -84,7 +78,8 @@ Eigen::Isometry3d parse_matrix(const json& rows, const std::string& where) {
   constexpr double rounding = 1e-3;  // of matrices written with few digits
   const Eigen::Isometry3d as_written(matrix);
   if (!is_rigid(as_written, rounding)) throw Error(where, "is not a rigid transform", remedy);
-  return pose(Eigen::Quaterniond(as_written.linear()).normalized(), as_written.translation());
+  const Eigen::Quaterniond rotation(as_written.linear());
+  return Trajectory::Sample{0.0, as_written.translation(), rotation.normalized()}.pose();
 }
 
 }  // namespace
@@ -96,11 +91,12 @@ std::optional<Eigen::Isometry3d> Trajectory::at(double stamp) const {
   const Sample* const b = after == samples_.end() ? nullptr : &*after;
   if (a != nullptr && b != nullptr && b->stamp - a->stamp <= gap_) {
     const double share = (stamp - a->stamp) / (b->stamp - a->stamp);
-    return pose(a->rotation.slerp(share, b->rotation),
-                a->translation + share * (b->translation - a->translation));
+    return Sample{stamp, a->translation + share * (b->translation - a->translation),
+                  a->rotation.slerp(share, b->rotation)}
+        .pose();
   }
-  if (a != nullptr && stamp - a->stamp <= tolerance) return pose(a->rotation, a->translation);
-  if (b != nullptr && b->stamp - stamp <= tolerance) return pose(b->rotation, b->translation);
+  if (a != nullptr && stamp - a->stamp <= tolerance) return a->pose();
+  if (b != nullptr && b->stamp - stamp <= tolerance) return b->pose();
   return std::nullopt;
 }
 

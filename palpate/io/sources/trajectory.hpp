@@ -22,6 +22,12 @@ class Trajectory {
     double stamp;  ///< [s]
     Eigen::Vector3d translation;
     Eigen::Quaterniond rotation;
+
+    [[nodiscard]] Eigen::Isometry3d pose() const {
+      Eigen::Isometry3d pose(rotation);
+      pose.translation() = translation;
+      return pose;
+    }
   };
 
   /// @param gap  [s] poses farther apart are not interpolated

@@ -56,12 +56,6 @@ Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::
   return {transform.header.stamp.seconds(), translation, rotation.normalized()};
 }
 
-Eigen::Isometry3d pose_of(const Trajectory::Sample& sample) {
-  Eigen::Isometry3d pose(sample.rotation);
-  pose.translation() = sample.translation;
-  return pose;
-}
-
 ros::TransformStamped transform_of(const ros::Header& header, const std::string& child,
                                    const Eigen::Isometry3d& parent_from_child) {
   const Eigen::Quaterniond q(parent_from_child.linear());
@@ -72,14 +66,13 @@ ros::TransformStamped transform_of(const ros::Header& header, const std::string&
           .rotation = {q.x(), q.y(), q.z(), q.w()}};
 }
 
-void TransformLinks::add(const ros::TransformStamped& transform, bool moves,
-                         const std::string& name) {
+void Transforms::link(const ros::TransformStamped& transform, bool moves, const std::string& name) {
   links_[plain_frame(transform.child_frame_id)] = {plain_frame(transform.header.frame_id), moves};
   if (links_.size() > most_tf_frames) throw Error(name, "has too many frames", "it may be damaged");
 }
 
-TransformWay TransformLinks::way(const std::string& frame, const std::string& fixed,
-                                 const std::string& whose) const {
+TransformWay Transforms::way(const std::string& frame, const std::string& fixed,
+                             const std::string& whose) const {
   // From the camera upwards; a way in a circle ends when all links were used.
   TransformWay result;
   std::vector<std::string>& way = result.children;
@@ -105,7 +98,7 @@ TransformWay TransformLinks::way(const std::string& frame, const std::string& fi
   return result;
 }
 
-bool TransformLinks::holds(const ros::TransformStamped& transform, bool moves) const {
+bool Transforms::holds(const ros::TransformStamped& transform, bool moves) const {
   const auto found = links_.find(plain_frame(transform.child_frame_id));
   return found != links_.end() && found->second.moves == moves &&
          found->second.parent == plain_frame(transform.header.frame_id);
@@ -113,8 +106,8 @@ bool TransformLinks::holds(const ros::TransformStamped& transform, bool moves) c
 
 void Transforms::add(const ros::TransformStamped& transform, bool moves, const std::string& name) {
   const Trajectory::Sample sample = sample_of(transform, name);
-  const bool goes_on = links_.holds(transform, moves);
-  links_.add(transform, moves, name);
+  const bool goes_on = holds(transform, moves);
+  link(transform, moves, name);
   std::deque<Trajectory::Sample>& line = samples_[plain_frame(transform.child_frame_id)];
   if (!goes_on || !moves) line.clear();
   // A clock that was set back begins again; several nodes' transforms may overtake one another.
@@ -133,8 +126,8 @@ std::optional<Eigen::Isometry3d> Transforms::at(const TransformWay& way, double 
     const auto found = samples_.find(child);
     if (found == samples_.end() || found->second.empty()) return std::nullopt;
     const std::deque<Trajectory::Sample>& line = found->second;
-    if (!links_.moves(child)) {
-      fixed_from_camera = pose_of(line.back()) * fixed_from_camera;
+    if (!links_.at(child).moves) {
+      fixed_from_camera = line.back().pose() * fixed_from_camera;
       continue;
     }
     const auto after = first_after(line, stamp);
@@ -153,7 +146,7 @@ bool Transforms::reach(const TransformWay& way, double stamp) const {
   return std::all_of(way.children.begin(), way.children.end(), [&](const std::string& child) {
     const auto found = samples_.find(child);
     return found != samples_.end() && !found->second.empty() &&
-           (!links_.moves(child) || found->second.back().stamp >= stamp);
+           (!links_.at(child).moves || found->second.back().stamp >= stamp);
   });
 }
 
@@ -162,9 +155,9 @@ bool BagTransforms::are_in(const BagReader& bag) {
 }
 
 BagTransforms::BagTransforms(BagReader& bag, const std::string& frame, const std::string& fixed) {
-  TransformLinks links;
+  Transforms links;
   for_each_transform(bag, [&](const auto& transform, bool moves, const std::string& name) {
-    links.add(transform, moves, name);
+    links.link(transform, moves, name);
   });
   way_ = links.way(frame, fixed, "the bag's TF");
   if (way_.fixed.empty()) return;

@@ -26,8 +26,6 @@ std::string plain_frame(const std::string& frame);
 /// @param name  of its message, for errors  @throws Error if it is not rigid.
 Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::string& name);
 
-Eigen::Isometry3d pose_of(const Trajectory::Sample& sample);
-
 /// @param header  of the parent's frame
 ros::TransformStamped transform_of(const ros::Header& header, const std::string& child,
                                    const Eigen::Isometry3d& parent_from_child);
@@ -39,35 +37,8 @@ struct TransformWay {
   std::string root;                   ///< above all others on the way from the camera's
 };
 
-/// Which frame of TF is whose child. A frame whose parent changes has the parent that it has last.
-class TransformLinks {
- public:
-  /// @param moves  it came on /tf, not on /tf_static  @param name  of its message, for errors
-  /// @throws Error if there are too many frames.
-  void add(const ros::TransformStamped& transform, bool moves, const std::string& name);
-
-  /// @param fixed  the fixed frame; empty: the first of map, odom and world that leads to `frame`
-  /// @param whose  TF, for errors
-  /// @throws Error if `fixed` is named and does not lead there.
-  [[nodiscard]] TransformWay way(const std::string& frame, const std::string& fixed,
-                                 const std::string& whose) const;
-  /// Is that the link by which its child hangs now?
-  [[nodiscard]] bool holds(const ros::TransformStamped& transform, bool moves) const;
-  /// @pre it is the child of a link
-  [[nodiscard]] bool moves(const std::string& child) const { return links_.at(child).moves; }
-  [[nodiscard]] bool empty() const { return links_.empty(); }
-
- private:
-  struct Link {
-    std::string parent;
-    bool moves;
-  };
-  std::map<std::string, Link> links_;  // by the child's frame
-};
-
-/// Transforms over time, from the network or a bag.
-///
-/// Between two of them it is interpolated: linear in translation, spherical (slerp) in rotation.
+/// Transforms over time, interpolated: linear in translation, spherical (slerp) in rotation. A
+/// frame whose parent changes has the parent that it has last.
 class Transforms {
  public:
   /// [s] Transforms farther apart are not interpolated.
@@ -76,10 +47,20 @@ class Transforms {
   /// @param kept  [s] before the newest, for which they are kept
   explicit Transforms(double kept = std::numeric_limits<double>::infinity()) : kept_(kept) {}
 
-  /// @param moves  it came on /tf  @throws Error if it is not rigid, or there are too many frames.
+  /// Notes which frame is whose child, but not where it is.
+  /// @param moves  it came on /tf, not on /tf_static  @param name  of its message, for errors
+  /// @throws Error if there are too many frames.
+  void link(const ros::TransformStamped& transform, bool moves, const std::string& name);
+  /// Notes where it is, too. @throws Error also if it is not rigid.
   void add(const ros::TransformStamped& transform, bool moves, const std::string& name);
+  /// Is that the link by which its child hangs now?
+  [[nodiscard]] bool holds(const ros::TransformStamped& transform, bool moves) const;
 
-  [[nodiscard]] const TransformLinks& links() const { return links_; }
+  /// @param fixed  the fixed frame; empty: the first of map, odom and world that leads to `frame`
+  /// @param whose  TF, for errors
+  /// @throws Error if `fixed` is named and does not lead there.
+  [[nodiscard]] TransformWay way(const std::string& frame, const std::string& fixed,
+                                 const std::string& whose) const;
   /// The pose of the way's first frame in its fixed one; none at a time that is not covered.
   /// @param stamp  [s] since 1970
   [[nodiscard]] std::optional<Eigen::Isometry3d> at(const TransformWay& way, double stamp) const;
@@ -87,13 +68,17 @@ class Transforms {
   [[nodiscard]] bool reach(const TransformWay& way, double stamp) const;
 
  private:
+  struct Link {
+    std::string parent;
+    bool moves;
+  };
+
   double kept_;
-  TransformLinks links_;
+  std::map<std::string, Link> links_;                              // by the child's frame
   std::map<std::string, std::deque<Trajectory::Sample>> samples_;  // by the child; stamps increase
 };
 
-/// Where a camera was in a fixed frame, by the transforms (TF) that a bag has on /tf and
-/// /tf_static. A frame of TF whose parent changes has the parent that it has last.
+/// Where a camera was in a fixed frame, by the transforms (TF) of a bag.
 class BagTransforms {
  public:
   /// @param frame  of the camera's images or points, as their headers name it

@@ -103,8 +103,8 @@ ViewingRays::Window pixels_between(const Intrinsics& k, const Eigen::Array2d& lo
 }
 
 VirtualCamera::VirtualCamera(std::shared_ptr<const Body> body, double frame_rate, SourceInfo info)
-    : body_(std::move(body)),
-      info_(std::move(info)),
+    : NumberedSource(std::move(info)),
+      body_(std::move(body)),
       rays_(std::make_shared<const ViewingRays>(window_intrinsics())),
       frame_rate_(frame_rate) {
   info_.frame_rate = frame_rate;
@@ -124,15 +124,10 @@ std::optional<Frame> VirtualCamera::next(double /*timeout*/) {
   std::transform(depth_.begin(), depth_.end(), readings.begin(), [](float depth) {
     return std::isfinite(depth) ? static_cast<std::uint16_t>(std::lround(depth * drawn_units)) : 0;
   });
-  const double stamp = static_cast<double>(next_frame_++) / frame_rate_;
+  const double stamp = static_cast<double>(next_++) / frame_rate_;
   return Frame{stamp,
                std::make_shared<const DepthImage>(rays_, std::move(readings), drawn_units,
                                                   world_from_body_ * view_.body_from_camera)};
-}
-
-std::size_t VirtualCamera::skip(std::size_t count) {
-  next_frame_ += count;
-  return count;
 }
 
 void VirtualCamera::follow(const Vec3& hand) {
@@ -145,8 +140,7 @@ bool VirtualCamera::place(const Eigen::Isometry3d& world_from_body, const std::s
   return true;
 }
 
-// The surface of the window before, where the hand is at it or behind it, and has come there
-// through it and not around it.
+// The surface of the window before, where the hand is at it or has come through it.
 std::optional<VirtualCamera::Aim> VirtualCamera::pressed() {
   const bool was_pressed = std::exchange(was_pressed_, false);
   if (depth_.empty()) return std::nullopt;
@@ -264,8 +258,7 @@ BodyOptions body_options(const Uri& uri, bool y_up, bool in_metres) {
                 "give x, y, z, -x, -y or -z");
   const auto number = found - axes.begin();
   const Vec3 axis = (number < 3 ? 1.0 : -1.0) * Vec3::Unit(number % 3);
-  // The shortest turn of it onto z. Eigen's FromTwoVectors would instantiate a singular value
-  // decomposition.
+  // The shortest turn of it onto z. Eigen's FromTwoVectors would need a decomposition.
   const Vec3 across = axis.cross(Vec3::UnitZ());
   const double twice = std::sqrt(2.0 * (1.0 + axis.z()));  // the cosine of half the angle
   options.turn = (twice > 0.0 ? Eigen::Quaterniond(0.5 * twice, across.x() / twice,

@@ -31,9 +31,8 @@ class Body {
   /// Draws the depth [m, along the optical axis] that each pixel sees, row by row; infinite where
   /// there is nothing. @param depth  of width * height
   virtual void draw(const View& view, std::span<float> depth) const = 0;
-  /// Twelve numbers of a Gaussian in the world, as pages draw it: its mean [m], its colour (65536
-  /// red
-  /// + 256 green + blue), its covariance [m^2] (xx xy xz yy yz zz), its opacity, and 0.
+  /// Twelve numbers of a Gaussian in the world, as pages draw it: mean [m], colour (65536 red + 256
+  /// green + blue), covariance [m^2] (xx xy xz yy yz zz), opacity, and 0.
   using DrawnGaussian = std::array<float, 12>;
   /// All that are felt; empty: it has none.
   [[nodiscard]] virtual std::vector<DrawnGaussian> gaussians(
@@ -63,6 +62,42 @@ class MeshBody final : public Body {
   std::optional<BoxTree> tree_;
 };
 
+/// One Gaussian of a splat.
+struct Gaussian {
+  Eigen::Vector3f mean;   ///< [m]
+  Eigen::Vector3f sigma;  ///< [m] along the axes of `turn`
+  Eigen::Quaternionf turn;
+  float opacity;                                      ///< [-] 0 to 1, at the mean
+  std::array<std::uint8_t, 3> colour{128, 128, 128};  ///< red, green, blue
+};
+
+/// A splat: depth is where the opacity gathered along a ray passes one half (docs/sources.md). What
+/// hides a Gaussian does not count, or whatever sticks out of a rough surface would be its place.
+class SplatBody final : public Body {
+ public:
+  /// Gaussians that are not finite or hide less than 5 % at their centre are left out, and those
+  /// that touch fewer than four others: floaters.
+  /// @param name  for messages
+  /// @throws Error if none is left that hides half.
+  SplatBody(std::vector<Gaussian> gaussians, const std::string& name);
+
+  [[nodiscard]] std::size_t size() const { return gaussians_.size(); }
+  [[nodiscard]] std::size_t floaters() const { return floaters_; }
+  [[nodiscard]] const Box& bounds() const override { return tree_->bounds(); }
+  [[nodiscard]] Vec3 nearest(const Vec3& at) const override;
+  void draw(const View& view, std::span<float> depth) const override;
+  [[nodiscard]] std::vector<DrawnGaussian> gaussians(
+      const Eigen::Isometry3d& world_from_body) const override;
+
+ private:
+  void build_tree();
+  [[nodiscard]] bool touches_others(const Gaussian& g) const;
+
+  std::vector<Gaussian> gaussians_;  // in the order of the tree
+  std::optional<BoxTree> tree_;
+  std::size_t floaters_ = 0;
+};
+
 /// The part of space that a view sees, in the body's frame.
 class SeenSpace {
  public:
@@ -79,24 +114,17 @@ ViewingRays::Window pixels_between(const Intrinsics& k, const Eigen::Array2d& lo
                                    const Eigen::Array2d& high) noexcept;
 
 /// A depth camera that looks at a body where the hand is, from outside: a window of 96 x 96 pixels
-/// of 1 mm, seen from 0.25 m, in units of 10 um, without noise.
-///
-/// It looks against the direction in which the space about the hand is free. While the hand is
-/// pressed into what the window before showed, it stays in front of that surface. Its pose is kept
-/// until the place moves by more than 15 mm across the window or that direction turns by more than
-/// 20 degrees, as methods average over frames of one pose. What would hide the place is cut away.
-/// Windows depend on the places of the hand alone, so the same path gives the same frames.
-class VirtualCamera final : public Source {
+/// of 1 mm, seen from 0.25 m, in units of 10 um, without noise (docs/sources.md). Windows depend on
+/// the places of the hand alone, so the same path gives the same frames.
+class VirtualCamera final : public NumberedSource {
  public:
   /// @param frame_rate  [Hz] > 0
   VirtualCamera(std::shared_ptr<const Body> body, double frame_rate, SourceInfo info);
 
   /// Frame k is stamped k / frame_rate. Before a hand is known, the body is seen from above.
   std::optional<Frame> next(double timeout = no_timeout) override;
-  std::size_t skip(std::size_t count) override;
   void follow(const Vec3& hand) override;
   bool place(const Eigen::Isometry3d& world_from_body, const std::string& uri) override;
-  [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
  private:
   // A place of the surface, and the unit vector from there to where the camera is to be.
@@ -111,10 +139,8 @@ class VirtualCamera final : public Source {
   void look(const Aim& aim);
 
   std::shared_ptr<const Body> body_;
-  SourceInfo info_;
   std::shared_ptr<const ViewingRays> rays_;
   double frame_rate_;
-  std::uint64_t next_frame_ = 0;
   Eigen::Isometry3d world_from_body_ = Eigen::Isometry3d::Identity();
   // All in the body's frame.
   Vec3 hand_, hand_before_;
@@ -140,13 +166,5 @@ BodyOptions body_options(const Uri& uri, bool y_up = false, bool in_metres = fal
 /// A virtual camera on a body, said to look at `what`, "a mesh of 12 triangles".
 std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
                                   std::shared_ptr<const Body> body, const std::string& what);
-
-/// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY, STL, OBJ or glTF, or with `level=0`
-/// where a volume as NRRD has that value.
-/// @throws Error if the file cannot be read or has no triangles, or an option is not known.
-std::unique_ptr<Source> open_map(const Uri& uri);
-/// `splat:FILE`, with the same options: Gaussians as PLY, SPZ or glTF. @throws Error if it is no
-/// splat
-std::unique_ptr<Source> open_splat(const Uri& uri);
 
 }  // namespace palpate

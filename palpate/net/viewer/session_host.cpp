@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/io/devices/mouse_device.hpp"
-#include "palpate/io/sources/point_file_source.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"

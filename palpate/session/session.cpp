@@ -440,10 +440,8 @@ void Session::open_hands(const Cloud& seen) {
     validate(hand.placement);
     std::unique_ptr<Device> device = std::move(options_.open_devices[i]);
     if (!device) device = open_hand(options_, hand.device, seen);
-    std::function<void(const ServoTick&)> on_tick;
-    if (options_.on_tick) on_tick = [this, i](const ServoTick& tick) { options_.on_tick(i, tick); };
-    hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement,
-                                                   std::move(on_tick)));
+    hands_.push_back(
+        std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement));
   }
   const auto mice = std::count_if(hands_.begin(), hands_.end(),
                                   [](const auto& hand) { return hand->mouse() != nullptr; });
@@ -601,10 +599,9 @@ void Session::run_free(std::optional<double> duration,
                        const std::function<void(const ServoTick&)>& on_tick) {
   begin_free();
   const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
-  TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
   for (std::int64_t i = 0; i < ticks && !stop_requested_.load(std::memory_order_relaxed); ++i) {
-    run_tick(i);
-    if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
+    const std::optional<ServoTick> first = run_tick(i);
+    if (on_tick && first) on_tick(*first);
     drain();
     if (i % ticks_between_flushes == 0) wait_for_recorder();
   }
@@ -616,7 +613,8 @@ void Session::begin_free() {
   started_ = true;
 }
 
-void Session::run_tick(std::int64_t number) {
+// @return the first hand's tick
+std::optional<ServoTick> Session::run_tick(std::int64_t number) {
   const double t = static_cast<double>(number) / options_.rate;
   free_t_ = t;
   const std::optional<Vec3> place = free_hand_();
@@ -624,7 +622,13 @@ void Session::run_tick(std::int64_t number) {
     if (place) played_[camera].follow(*place);
     while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
   }
-  for (const auto& hand : hands_) hand->run_at(t);
+  std::optional<ServoTick> first;
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    const std::optional<ServoTick> tick = hands_[i]->run_at(t);
+    if (options_.on_tick && tick) options_.on_tick(i, *tick);
+    if (i == 0) first = tick;
+  }
+  return first;
 }
 
 // The clock waits for the disk here, as it runs faster than time: recorders have no threads then.

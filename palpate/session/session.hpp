@@ -244,7 +244,7 @@ class Session {
   void run_free(std::optional<double> duration,
                 const std::function<void(const ServoTick&)>& on_tick);
   void begin_free();
-  void run_tick(std::int64_t number);
+  std::optional<ServoTick> run_tick(std::int64_t number);
   void wait_for_recorder();
   void keep_house();
   void drain();

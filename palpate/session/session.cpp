@@ -264,8 +264,15 @@ void Session::run(std::optional<double> duration,
     const double end = monotonic_now() + duration.value_or(1e18);
     while (!stop_requested_.load(std::memory_order_relaxed) && monotonic_now() < end)
       std::this_thread::sleep_for(stop_poll_interval);
-  } else {
-    run_free(duration, on_tick);
+    return;
+  }
+  begin_free();
+  const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
+  for (std::int64_t i = 0; i < ticks && !stop_requested_.load(std::memory_order_relaxed); ++i) {
+    const std::optional<ServoTick> first = run_tick(i);
+    if (on_tick && first) on_tick(*first);
+    drain();
+    if (i % ticks_between_flushes == 0) wait_for_recorder();
   }
 }
 
@@ -290,7 +297,16 @@ SessionState Session::state() {
   SessionState state;
   for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
   for (const Player& played : played_) state.cameras.push_back(played.status());
-  for (const auto& hand : hands_) state.hands.push_back(report(*hand));
+  for (const auto& hand : hands_) {
+    SessionHandState& told = state.hands.emplace_back();
+    told.name = hand->name();
+    if (hand->loop() != nullptr) told.device = hand->loop()->device_status();
+    const CycleStatistics& statistics = hand->cycle().statistics();
+    for (std::size_t i = 0; i < safety_flag_count; ++i)
+      told.interventions[i] = statistics.interventions[i].load();
+    told.latched_by = statistics.latched_by.load();
+    told.summary = hand->summary();
+  }
   const ServoLoop* loop = hands_.front()->loop();
   state.rate = loop != nullptr ? loop->rate() : options_.rate;
   state.running = started_ && !stopped_;
@@ -440,8 +456,7 @@ void Session::open_hands(const Cloud& seen) {
     validate(hand.placement);
     std::unique_ptr<Device> device = std::move(options_.open_devices[i]);
     if (!device) device = open_hand(options_, hand.device, seen);
-    hands_.push_back(
-        std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement));
+    hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement));
   }
   const auto mice = std::count_if(hands_.begin(), hands_.end(),
                                   [](const auto& hand) { return hand->mouse() != nullptr; });
@@ -449,17 +464,6 @@ void Session::open_hands(const Cloud& seen) {
     throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
   if (alone) return;
   for (const auto& hand : hands_) hand->prepare_link();
-}
-
-SessionHandState Session::report(const SessionHand& hand) {
-  SessionHandState state{.name = hand.name(), .placement = {}, .device = {}, .summary = {}};
-  if (hand.loop() != nullptr) state.device = hand.loop()->device_status();
-  const CycleStatistics& statistics = hand.cycle().statistics();
-  for (std::size_t i = 0; i < safety_flag_count; ++i)
-    state.interventions[i] = statistics.interventions[i].load();
-  state.latched_by = statistics.latched_by.load();
-  state.summary = hand.summary();
-  return state;
 }
 
 std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,
@@ -546,7 +550,6 @@ void Session::take(std::size_t camera, const FedFrame& fed) {
   if (options_.on_frame) options_.on_frame(camera, fed);
 }
 
-// What the session's options say that a frame is made of.
 std::shared_ptr<const Cloud> Session::with_materials(std::shared_ptr<const Cloud> cloud,
                                                      std::size_t camera) {
   const DepthImage* image = cloud->image();
@@ -593,18 +596,6 @@ void Session::give(std::size_t camera, const FedFrame& fed) {
   }
   newest_[camera] = std::move(painted);
   ++frames_;
-}
-
-void Session::run_free(std::optional<double> duration,
-                       const std::function<void(const ServoTick&)>& on_tick) {
-  begin_free();
-  const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
-  for (std::int64_t i = 0; i < ticks && !stop_requested_.load(std::memory_order_relaxed); ++i) {
-    const std::optional<ServoTick> first = run_tick(i);
-    if (on_tick && first) on_tick(*first);
-    drain();
-    if (i % ticks_between_flushes == 0) wait_for_recorder();
-  }
 }
 
 void Session::begin_free() {

@@ -55,10 +55,10 @@ class SessionHand {
   std::string name_;
   std::unique_ptr<Device> device_;
   MouseDevice* mouse_;
-  LinkedDevice* linked_ = nullptr;     // the same as device_, if it is one
-  std::unique_ptr<ServoLoop> loop_;    // in real time
-  std::unique_ptr<Cycle> free_cycle_;  // free-running
-  Cycle* cycle_ = nullptr;             // of one of these
+  LinkedDevice* linked_ = nullptr;                  // the same as device_, if it is one
+  std::unique_ptr<ServoLoop> loop_;                 // in real time
+  std::unique_ptr<Cycle> free_cycle_;               // free-running
+  Cycle* cycle_ = nullptr;                          // of one of these
   std::optional<TickRing<ServoTick>::Reader> run_;  // of run_at
 
   mutable std::mutex mutex_;

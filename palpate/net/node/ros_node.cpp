@@ -47,7 +47,6 @@ struct TickReport {
   }
 };
 
-// How a session was over some time.
 struct SessionReport {
   SessionState state;
   double tick_rate = 0.0;        // [Hz] measured
@@ -246,7 +245,6 @@ ros::MarkerArray markers_of(const ServoTick& record, double contact_radius,
        arrow(header, "normal", tick.proxy, normal_length * tick.normal, normal_colour)}};
 }
 
-// Loop, cameras, each hand's contact and device, and recording, each with its level.
 ros::DiagnosticArray diagnostics_of(const SessionReport& report, const ros::Header& header) {
   ros::DiagnosticArray array;
   array.header = header;
@@ -303,7 +301,6 @@ std::array<std::uint8_t, size> identity(const dds::Guid& guid) {
   return bytes;
 }
 
-// The topics of a hand, and what has been read of it.
 struct HandTopics {
   HandTopics(dds::Participant& participant, const std::string& name,
              const TickRing<ServoTick>::Reader& reader)

@@ -26,7 +26,6 @@ enum Kind : std::uint8_t {
   hand = 16,
   shown = 17
 };
-// What a hand message says of the hand.
 enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
 enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
 // Whose pixels colours are: nobody's, those of the depth or the points, another camera's.

@@ -180,7 +180,6 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   }
   void may_explain_again() { explained_ = false; }
 
-  // Why what the page asked for was not done.
   void refuse(std::string_view why) {
     send(std::make_shared<const ViewerMessage>(text_message(nlohmann::json{{"error", why}}.dump(
         -1, ' ', false, nlohmann::json::error_handler_t::replace))));
@@ -512,7 +511,6 @@ class ViewerServer::Impl final : public Hub {
   void accept();
   void make_room();
 
-  // Every ticks_interval.
   void wait() {
     timer_.expires_after(ticks_interval);
     timer_.async_wait([this](beast::error_code error) {
@@ -654,7 +652,6 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   }
 
   [[nodiscard]] const std::string& source() const { return source_; }
-  // Closes the connection, whatever it is doing.
   void close() { stream_.close(); }
 
  private:

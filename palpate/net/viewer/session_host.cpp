@@ -28,7 +28,6 @@ namespace {
 using nlohmann::json;
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
-// Tools that a page can choose.
 constexpr std::array<const char*, 7> tools = {
     "ball",        "box:40x20x5mm",    "box:30x30x30mm", "capsule:80x8mm", "cylinder:40x20mm",
     "cone:60x6mm", "gripper:40x30x8mm"};
@@ -54,7 +53,6 @@ json rows_json(std::span<const ParameterRow<Owner>> table) {
   return rows;
 }
 
-// What the numbers of a table are now, by name.
 template <class Owner>
 json values_json(std::span<const ParameterRow<Owner>> table, const Owner& owner) {
   json values;
@@ -97,7 +95,6 @@ json row_by_row(const Eigen::Matrix<double, 3, 4>& pose) {
   return numbers;
 }
 
-// What the page draws of a fixture.
 json fixture_to_draw(const Fixture& fixture) {
   json pose = row_by_row(fixture.world_from_fixture.matrix().topRows<3>());
   Vec3 size = fixture.size;
@@ -427,12 +424,6 @@ std::string SessionHost::more_hands() {
   return hands.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-// [m] between the proxy and what it touches; a tool touches with its own surface.
-double SessionHost::contact_radius() const {
-  const ServoSettings settings = session_->settings();
-  return settings.tool ? 0.0 : settings.parameters.proxy.r_c();
-}
-
 // To all pages, if it is another than before.
 void SessionHost::show_tool(const std::shared_ptr<const ToolShape>& tool) {
   ViewerServer* server = server_.load(std::memory_order_acquire);
@@ -442,7 +433,9 @@ void SessionHost::show_tool(const std::shared_ptr<const ToolShape>& tool) {
 }
 
 std::optional<TickBatch> SessionHost::ticks() {
-  const double radius = contact_radius();
+  const ServoSettings settings = session_->settings();
+  // [m] between the proxy and what it touches; a tool touches with its own surface.
+  const double radius = settings.tool ? 0.0 : settings.parameters.proxy.r_c();
   const bool has_torque = session_->device().info().limits.max_torque > 0.0;
   for (ServoTick record{}; reader_->try_pop(record);) {
     if (!has_torque) record.torque = record.gain * record.tick.torque;  // shown, never felt

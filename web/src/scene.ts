@@ -741,12 +741,6 @@ export class SceneView {
     this.setOrbit({ ...this.orbit, target: add(this.orbit.target, scale(away, 0.12)) });
   }
 
-  // The surface that the hand is over, and how high it is above it [m].
-  private underHand(): { spot: Spot; height: number } | null {
-    const spot = this.tick && this.spotAt(this.tick.proxy);
-    return spot && { spot, height: dot(sub(this.tick!.proxy, spot.at), spot.normal) };
-  }
-
   // Once: from what is seen at first. A moving camera's frustum moves with it.
   private placeCameras(): void {
     const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
@@ -802,7 +796,9 @@ export class SceneView {
     if (this.turning.visible) this.lay(this.turning, about, turnRadius);
 
     // The shadow on what the hand is over, and the line down to it.
-    const under = (this.under = this.underHand());
+    const spot = this.spotAt(tick.proxy);
+    const under = spot && { spot, height: dot(sub(tick.proxy, spot.at), spot.normal) };
+    this.under = under;
     const near = under !== null && Math.abs(under.height) < 0.5;
     this.shadow.visible = near && under.height > 0.5 * r_c;
     this.plumb.visible = false;

@@ -120,7 +120,7 @@ export class SeenSurface {
     const face = this.frame.triangles && this.meetFaces(start, direction);
     if (face) {
       const at = add(from, scale(along, face.distance));
-      return { spot: { at, normal: this.turnedToWorld(face.normal) }, distance: face.distance };
+      return { spot: { at, normal: sub(this.toWorld(face.normal), this.eye) }, distance: face.distance };
     }
     const distance = this.frame.points
       ? this.meetPoints(start, direction)
@@ -342,10 +342,6 @@ export class SeenSurface {
 
   private toWorld(p: Vec3): Vec3 {
     return posed(this.pose, p);
-  }
-
-  private turnedToWorld(v: Vec3): Vec3 {
-    return sub(posed(this.pose, v), this.eye);
   }
 
   private toCamera(p: Vec3): Vec3 {

@@ -84,6 +84,26 @@ void walk(Way& way, T& record) {
   way("torque", record.torque);
 }
 
+// A tool's points, so that a replay needs no mesh.
+json tool_json(const ToolShape& tool) {
+  json numbers = json::array();
+  for (const ToolShape::Point& point : tool.points())
+    for (const Vec3* v : {&point.at, &point.inward})
+      for (int axis = 0; axis < 3; ++axis) numbers.push_back((*v)[axis]);
+  return {{"text", tool.text()}, {"turning", tool.turning()}, {"points", numbers}};
+}
+
+std::shared_ptr<const ToolShape> tool_from_json(const json& object) {
+  const auto numbers = object.at("points").get<std::vector<double>>();
+  std::vector<ToolShape::Point> points(numbers.size() / 6);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double* n = numbers.data() + 6 * i;
+    points[i] = {Vec3(n[0], n[1], n[2]), Vec3(n[3], n[4], n[5]), 0};
+  }
+  return std::make_shared<const ToolShape>(std::move(points), object.at("text").get<std::string>(),
+                                           object.at("turning").get<double>());
+}
+
 }  // namespace
 
 const std::vector<std::string>& tick_columns() {
@@ -198,30 +218,6 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     return info;
   });
 }
-
-namespace {
-
-// A tool's points, so that a replay needs no mesh.
-json tool_json(const ToolShape& tool) {
-  json numbers = json::array();
-  for (const ToolShape::Point& point : tool.points())
-    for (const Vec3* v : {&point.at, &point.inward})
-      for (int axis = 0; axis < 3; ++axis) numbers.push_back((*v)[axis]);
-  return {{"text", tool.text()}, {"turning", tool.turning()}, {"points", numbers}};
-}
-
-std::shared_ptr<const ToolShape> tool_from_json(const json& object) {
-  const auto numbers = object.at("points").get<std::vector<double>>();
-  std::vector<ToolShape::Point> points(numbers.size() / 6);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double* n = numbers.data() + 6 * i;
-    points[i] = {Vec3(n[0], n[1], n[2]), Vec3(n[3], n[4], n[5]), 0};
-  }
-  return std::make_shared<const ToolShape>(std::move(points), object.at("text").get<std::string>(),
-                                           object.at("turning").get<double>());
-}
-
-}  // namespace
 
 std::string to_json(const ServoCommands& commands) {
   const ServoSettings& all = commands.settings;

@@ -38,10 +38,6 @@ constexpr double camera_join_time = 0.5;             // [s] for a camera's threa
 constexpr std::int64_t ticks_between_flushes = 500;  // of a free-running session's recording
 constexpr double longest_catch_up = 0.1;             // [s] of ticks that are late, in `advance`
 
-std::string seconds_text(double seconds) {
-  return std::to_string(static_cast<int>(seconds)) + " s";
-}
-
 std::function<std::unique_ptr<Source>()> opener(const CameraSpec& camera,
                                                 const Registry<SourceScheme>& sources) {
   if (camera.world_from_camera && Uri(camera.uri).has("pose"))
@@ -492,7 +488,8 @@ std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,
   if (length < shortest_loop) feeds_.back()->set_playback({.loop = false});
   const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
   if (!first)
-    throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),
+    throw Error(camera.uri,
+                "it has delivered no frame in " + number_text(first_frame_timeout) + " s",
                 "check the camera, its cable and its permissions");
   return first->cloud;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hands beside the first, and a robot that is led: what is said of them, and where their lines go.
+// The hands beside the first, and a robot that is led: what is said of them, and their lines.
 
 import { add, length, scale } from "./camera_math";
 import type { OtherHand, RobotState, Vec3 } from "./protocol";

@@ -120,7 +120,8 @@ export class SeenSurface {
     const face = this.frame.triangles && this.meetFaces(start, direction);
     if (face) {
       const at = add(from, scale(along, face.distance));
-      return { spot: { at, normal: sub(this.toWorld(face.normal), this.eye) }, distance: face.distance };
+      const normal = sub(this.toWorld(face.normal), this.eye);
+      return { spot: { at, normal }, distance: face.distance };
     }
     const distance = this.frame.points
       ? this.meetPoints(start, direction)

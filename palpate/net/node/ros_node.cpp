@@ -19,6 +19,7 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/net/node/node_parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -107,9 +108,9 @@ Marker arrow(const ros::Header& header, const std::string& name, const Vec3& fro
   return made;
 }
 
-std::string number(double value, const char* format = "%.4g") {
+std::string number(double value) {
   std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), format, value);
+  std::snprintf(text.data(), text.size(), "%.4g", value);
   return text.data();
 }
 
@@ -124,9 +125,7 @@ std::string names_of(std::uint32_t bits, const Names& names) {
 }
 
 std::string tick_flags(std::uint32_t bits) {
-  std::vector<std::string_view> names;
-  for (const TickFlagInfo& flag : tick_flag_table()) names.push_back(flag.name);
-  return names_of(bits, names);
+  return names_of(bits, palpate::names_of(tick_flag_table()));
 }
 
 DiagnosticStatus status(const std::string& name, std::uint8_t level, std::string message) {

@@ -73,7 +73,6 @@ void compare(const ServoTick& recorded, const ServoTick& again, const TickRows& 
   if (sent) count(report.sent, again.force - recorded.force);
 }
 
-// The device of a replay: its hand is where it was then.
 class ReplayDevice final : public Device {
  public:
   explicit ReplayDevice(const DeviceLimits& limits)

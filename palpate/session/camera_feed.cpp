@@ -351,7 +351,6 @@ class CameraFeed::Worker {
       if (end - begin < 0.5 * idle_pause) wait_until(end + idle_pause);
     }
   }
-  // Tells the source where the hand is.
   void follow() {
     std::optional<Vec3> hand;
     {

@@ -53,7 +53,6 @@ void read_operator_limits(const TomlTable& root, std::map<std::string, double>& 
   }
 }
 
-// Reads the table `name` of the file, if there is one.
 template <class Owner>
 void read_table(const TomlTable& root, const std::string& name, Owner& owner) {
   if (const toml::table* table = root.sub(name))

@@ -20,6 +20,11 @@ std::vector<std::unique_ptr<Source>> opened(const std::vector<std::string>& uris
   return sources;
 }
 
+void check_rate(double rate) {
+  if (!(rate >= 1.0 && rate <= 100000.0))
+    throw Error("rate", std::to_string(rate) + " Hz is not a tick rate", "give 1 to 100000");
+}
+
 }  // namespace
 
 FrameSequence::FrameSequence(const std::vector<std::string>& uris) : FrameSequence(opened(uris)) {}
@@ -71,15 +76,6 @@ std::vector<SensorKind> FrameSequence::sensors() const {
 void FrameSequence::check(const Method& method) const {
   for (const Player& player : players_) method.check(*player.upcoming()->cloud);
 }
-
-namespace {
-
-void check_rate(double rate) {
-  if (!(rate >= 1.0 && rate <= 100000.0))
-    throw Error("rate", std::to_string(rate) + " Hz is not a tick rate", "give 1 to 100000");
-}
-
-}  // namespace
 
 std::int64_t ticks_along(const HipPath& path, double rate) {
   check_rate(rate);

@@ -124,7 +124,13 @@ std::optional<double> ObserverRecordings::room() const {
 }
 
 std::string ObserverRecordings::reason_to_end() {
-  const double left = rules_.limit - recorded();
+  std::vector<std::filesystem::path> folders;
+  {
+    const std::lock_guard lock(mutex_);
+    folders = folders_;
+  }
+  double left = rules_.limit;
+  for (const auto& folder : folders) left -= size_of(folder);
   if (left <= 0.0)
     return "the recordings of this session have reached " + size_text(rules_.limit) +
            " (--record-limit)";
@@ -136,17 +142,6 @@ std::string ObserverRecordings::reason_to_end() {
   const std::lock_guard lock(mutex_);
   room_ = error ? left : std::min(left, static_cast<double>(space.available) - rules_.keep_free);
   return {};
-}
-
-double ObserverRecordings::recorded() const {
-  std::vector<std::filesystem::path> folders;
-  {
-    const std::lock_guard lock(mutex_);
-    folders = folders_;
-  }
-  double size = 0.0;
-  for (const auto& folder : folders) size += size_of(folder);
-  return size;
 }
 
 }  // namespace palpate

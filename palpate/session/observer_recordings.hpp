@@ -45,8 +45,7 @@ class ObserverRecordings {
 
  private:
   void watch();
-  std::string reason_to_end();            // empty: none
-  [[nodiscard]] double recorded() const;  // [bytes]
+  std::string reason_to_end();  // empty: none
 
   Session& session_;
   const RecordingRules rules_;

@@ -16,27 +16,17 @@ constexpr double least_seen = 0.3;
 // [-] of a radius within which dabs are one.
 constexpr double apart = 1.0 / 3.0;
 
-void add_missing(MaterialTable& table, const std::vector<NamedMaterial>& others) {
-  for (const NamedMaterial& other : others) {
-    const bool is_there = std::any_of(table.materials.begin(), table.materials.end(),
-                                      [&](const NamedMaterial& m) { return m.name == other.name; });
-    if (!is_there && table.materials.size() < MaterialTable::most) table.materials.push_back(other);
-  }
-}
-
-// A camera's materials and all standard ones whose names it does not have.
-MaterialTable with_standard(const MaterialTable* base) {
+// A camera's materials, and of the standard ones and those that are defined what has another name.
+MaterialTable all_materials(const MaterialTable* base,
+                            const std::vector<NamedMaterial>& defined = {}) {
   MaterialTable table = base == nullptr ? MaterialTable{} : *base;
-  add_missing(table, standard_materials().materials);
+  for (const auto* others : {&standard_materials().materials, &defined}) {
+    for (const NamedMaterial& other : *others) {
+      if (table.label(other.name) == 0 && table.materials.size() < MaterialTable::most)
+        table.materials.push_back(other);
+    }
+  }
   return table;
-}
-
-std::uint8_t label_of(const MaterialTable& table, const std::string& name) {
-  const auto found = std::find_if(table.materials.begin(), table.materials.end(),
-                                  [&](const NamedMaterial& m) { return m.name == name; });
-  return found == table.materials.end()
-             ? std::uint8_t{0}
-             : static_cast<std::uint8_t>(found - table.materials.begin() + 1);
 }
 
 // Calls `visit(pixel, point, ahead)` for each measured pixel of a dab: `point` in the camera's axes
@@ -77,13 +67,8 @@ std::size_t for_each_pixel(const DepthImage& image, const Vec3& place, double ra
 void Paint::define(const NamedMaterial& material) {
   validate(MaterialTable{{material}});
   const std::lock_guard lock(mutex_);
-  const bool is_there = std::any_of(defined_.begin(), defined_.end(), [&](const NamedMaterial& m) {
-    return m.name == material.name;
-  });
-  if (is_there) return;
-  MaterialTable table = with_standard(base_.get());
-  add_missing(table, defined_);
-  if (table.materials.size() >= MaterialTable::most)
+  if (MaterialTable{defined_}.label(material.name) != 0) return;
+  if (all_materials(base_.get(), defined_).materials.size() >= MaterialTable::most)
     throw Error("brush", "there are " + std::to_string(MaterialTable::most) + " materials already",
                 "name fewer in the camera's file");
   defined_.push_back(material);
@@ -96,9 +81,7 @@ void Paint::add(const Dab& dab) {
                 "the position is not finite or beyond 1000 km, or the radius is out of range",
                 "use a point on the surface and a radius from 1 mm to 100 mm");
   const std::lock_guard lock(mutex_);
-  MaterialTable table = table_ ? *table_ : with_standard(base_.get());
-  add_missing(table, defined_);
-  if (label_of(table, dab.material) == 0)
+  if ((table_ ? *table_ : all_materials(base_.get(), defined_)).label(dab.material) == 0)
     static_cast<void>(standard_material(dab.material));  // throws, naming the nearest
   const auto same = std::find_if(dabs_.begin(), dabs_.end(), [&](const Dab& other) {
     return (other.place - dab.place).norm() <= apart * dab.radius && other.radius <= dab.radius;
@@ -130,7 +113,7 @@ std::vector<std::string> Paint::names(const Cloud& cloud) {
   const MaterialMap* map = image == nullptr ? nullptr : image->materials().get();
   std::vector<std::string> names;
   for (const NamedMaterial& m :
-       with_standard(map == nullptr ? nullptr : map->table().get()).materials)
+       all_materials(map == nullptr ? nullptr : map->table().get()).materials)
     names.push_back(m.name);
   return names;
 }
@@ -144,9 +127,7 @@ std::shared_ptr<const Cloud> Paint::on(const std::shared_ptr<const Cloud>& cloud
   const auto base = map == nullptr ? nullptr : map->table();
   if (!table_ || base != base_) {
     base_ = base;
-    MaterialTable table = with_standard(base.get());
-    add_missing(table, defined_);
-    table_ = std::make_shared<const MaterialTable>(std::move(table));
+    table_ = std::make_shared<const MaterialTable>(all_materials(base.get(), defined_));
   }
   if (dabs_.empty()) return cloud;
 
@@ -181,7 +162,7 @@ std::shared_ptr<const Cloud> Paint::on(const std::shared_ptr<const Cloud>& cloud
         dab.place += sum / static_cast<double>(seen) * (dab.place - eye).normalized();
       }
     }
-    const std::uint8_t label = label_of(*table_, dab.material);
+    const std::uint8_t label = table_->label(dab.material);
     for_each_pixel(*image, dab.place, dab.radius, [&](std::size_t i, const Vec3&, double ahead) {
       if (std::abs(ahead) <= layer) labels[i] = label;
     });

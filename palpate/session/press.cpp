@@ -180,7 +180,6 @@ std::optional<Press::Line> Press::look(double u, double v) {
               *median_depth(*image, *near) * direction.norm(), *near};
 }
 
-// Where the slide has come to.
 std::optional<Press::Line> Press::look_on_the_way() {
   const Pixel& to = *options_.slide_to;
   return look(slides_from_.u + slid_ * (to.u - slides_from_.u),

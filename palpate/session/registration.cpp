@@ -127,6 +127,11 @@ double spread(std::span<const PointPair> pairs, Vec3 PointPair::*member) {
   return std::sqrt(squares / static_cast<double>(pairs.size()));
 }
 
+constexpr double rest_time = 0.5;     // [s] a device without buttons rests for so long
+constexpr double rest_radius = 1e-3;  // [m] within this distance of where the rest began
+constexpr double least_travel =
+    0.01;  // [m] from the last point, or from the start, before the next
+
 }  // namespace
 
 PlacementFit fit_placement(std::span<const PointPair> pairs, const FitOptions& options) {
@@ -185,15 +190,6 @@ std::vector<Vec3> read_points(const std::filesystem::path& file) {
   for (const auto& row : read_columns(file, columns)) points.emplace_back(row[0], row[1], row[2]);
   return points;
 }
-
-namespace {
-
-constexpr double rest_time = 0.5;     // [s] a device without buttons rests for so long
-constexpr double rest_radius = 1e-3;  // [m] within this distance of where the rest began
-constexpr double least_travel =
-    0.01;  // [m] from the last point, or from the start, before the next
-
-}  // namespace
 
 std::optional<Vec3> PointCapture::add(const HandState& hand, double t) noexcept {
   if (!hand.present || hand.fault != DeviceFault::none || !hand.position.allFinite()) {

@@ -38,10 +38,6 @@ constexpr double camera_join_time = 0.5;             // [s] for a camera's threa
 constexpr std::int64_t ticks_between_flushes = 500;  // of a free-running session's recording
 constexpr double longest_catch_up = 0.1;             // [s] of ticks that are late, in `advance`
 
-std::string seconds_text(double seconds) {
-  return std::to_string(static_cast<int>(seconds)) + " s";
-}
-
 std::function<std::unique_ptr<Source>()> opener(const CameraSpec& camera,
                                                 const Registry<SourceScheme>& sources) {
   if (camera.world_from_camera && Uri(camera.uri).has("pose"))
@@ -264,8 +260,15 @@ void Session::run(std::optional<double> duration,
     const double end = monotonic_now() + duration.value_or(1e18);
     while (!stop_requested_.load(std::memory_order_relaxed) && monotonic_now() < end)
       std::this_thread::sleep_for(stop_poll_interval);
-  } else {
-    run_free(duration, on_tick);
+    return;
+  }
+  begin_free();
+  const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
+  for (std::int64_t i = 0; i < ticks && !stop_requested_.load(std::memory_order_relaxed); ++i) {
+    const std::optional<ServoTick> first = run_tick(i);
+    if (on_tick && first) on_tick(*first);
+    drain();
+    if (i % ticks_between_flushes == 0) wait_for_recorder();
   }
 }
 
@@ -290,7 +293,16 @@ SessionState Session::state() {
   SessionState state;
   for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
   for (const Player& played : played_) state.cameras.push_back(played.status());
-  for (const auto& hand : hands_) state.hands.push_back(report(*hand));
+  for (const auto& hand : hands_) {
+    SessionHandState& told = state.hands.emplace_back();
+    told.name = hand->name();
+    if (hand->loop() != nullptr) told.device = hand->loop()->device_status();
+    const CycleStatistics& statistics = hand->cycle().statistics();
+    for (std::size_t i = 0; i < safety_flag_count; ++i)
+      told.interventions[i] = statistics.interventions[i].load();
+    told.latched_by = statistics.latched_by.load();
+    told.summary = hand->summary();
+  }
   const ServoLoop* loop = hands_.front()->loop();
   state.rate = loop != nullptr ? loop->rate() : options_.rate;
   state.running = started_ && !stopped_;
@@ -440,10 +452,7 @@ void Session::open_hands(const Cloud& seen) {
     validate(hand.placement);
     std::unique_ptr<Device> device = std::move(options_.open_devices[i]);
     if (!device) device = open_hand(options_, hand.device, seen);
-    std::function<void(const ServoTick&)> on_tick;
-    if (options_.on_tick) on_tick = [this, i](const ServoTick& tick) { options_.on_tick(i, tick); };
-    hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement,
-                                                   std::move(on_tick)));
+    hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement));
   }
   const auto mice = std::count_if(hands_.begin(), hands_.end(),
                                   [](const auto& hand) { return hand->mouse() != nullptr; });
@@ -451,17 +460,6 @@ void Session::open_hands(const Cloud& seen) {
     throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
   if (alone) return;
   for (const auto& hand : hands_) hand->prepare_link();
-}
-
-SessionHandState Session::report(const SessionHand& hand) {
-  SessionHandState state{.name = hand.name(), .placement = {}, .device = {}, .summary = {}};
-  if (hand.loop() != nullptr) state.device = hand.loop()->device_status();
-  const CycleStatistics& statistics = hand.cycle().statistics();
-  for (std::size_t i = 0; i < safety_flag_count; ++i)
-    state.interventions[i] = statistics.interventions[i].load();
-  state.latched_by = statistics.latched_by.load();
-  state.summary = hand.summary();
-  return state;
 }
 
 std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,
@@ -490,7 +488,8 @@ std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,
   if (length < shortest_loop) feeds_.back()->set_playback({.loop = false});
   const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
   if (!first)
-    throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),
+    throw Error(camera.uri,
+                "it has delivered no frame in " + number_text(first_frame_timeout) + " s",
                 "check the camera, its cable and its permissions");
   return first->cloud;
 }
@@ -548,7 +547,6 @@ void Session::take(std::size_t camera, const FedFrame& fed) {
   if (options_.on_frame) options_.on_frame(camera, fed);
 }
 
-// What the session's options say that a frame is made of.
 std::shared_ptr<const Cloud> Session::with_materials(std::shared_ptr<const Cloud> cloud,
                                                      std::size_t camera) {
   const DepthImage* image = cloud->image();
@@ -597,26 +595,14 @@ void Session::give(std::size_t camera, const FedFrame& fed) {
   ++frames_;
 }
 
-void Session::run_free(std::optional<double> duration,
-                       const std::function<void(const ServoTick&)>& on_tick) {
-  begin_free();
-  const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
-  TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
-  for (std::int64_t i = 0; i < ticks && !stop_requested_.load(std::memory_order_relaxed); ++i) {
-    run_tick(i);
-    if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
-    drain();
-    if (i % ticks_between_flushes == 0) wait_for_recorder();
-  }
-}
-
 void Session::begin_free() {
   for (const auto& hand : hands_) hand->device().enable();
   free_hand_ = hand_place();
   started_ = true;
 }
 
-void Session::run_tick(std::int64_t number) {
+// @return the first hand's tick
+std::optional<ServoTick> Session::run_tick(std::int64_t number) {
   const double t = static_cast<double>(number) / options_.rate;
   free_t_ = t;
   const std::optional<Vec3> place = free_hand_();
@@ -624,7 +610,13 @@ void Session::run_tick(std::int64_t number) {
     if (place) played_[camera].follow(*place);
     while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
   }
-  for (const auto& hand : hands_) hand->run_at(t);
+  std::optional<ServoTick> first;
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    const std::optional<ServoTick> tick = hands_[i]->run_at(t);
+    if (options_.on_tick && tick) options_.on_tick(i, *tick);
+    if (i == 0) first = tick;
+  }
+  return first;
 }
 
 // The clock waits for the disk here, as it runs faster than time: recorders have no threads then.

@@ -227,7 +227,6 @@ class Session {
   [[nodiscard]] ServoSettings for_hardware(ServoSettings settings) const;
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
   void open_hands(const Cloud& seen);
-  [[nodiscard]] static SessionHandState report(const SessionHand& hand);
   std::shared_ptr<const Cloud> open_camera(CameraSpec& camera, std::unique_ptr<Source> source);
   [[nodiscard]] std::shared_ptr<Method> open_method(
       const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const;
@@ -241,10 +240,8 @@ class Session {
                                               std::size_t camera);
   [[nodiscard]] std::function<std::optional<Vec3>()> hand_place() const;
   void give(std::size_t camera, const FedFrame& fed);
-  void run_free(std::optional<double> duration,
-                const std::function<void(const ServoTick&)>& on_tick);
   void begin_free();
-  void run_tick(std::int64_t number);
+  std::optional<ServoTick> run_tick(std::int64_t number);
   void wait_for_recorder();
   void keep_house();
   void drain();

@@ -11,12 +11,10 @@
 
 namespace palpate {
 
-SessionHand::SessionHand(std::string name, std::unique_ptr<Device> device, const Placement& place,
-                         std::function<void(const ServoTick&)> on_tick)
+SessionHand::SessionHand(std::string name, std::unique_ptr<Device> device, const Placement& place)
     : name_(std::move(name)),
       device_(std::move(device)),
       mouse_(dynamic_cast<MouseDevice*>(device_.get())),
-      on_tick_(std::move(on_tick)),
       placement(place) {}
 
 SessionHand::~SessionHand() {
@@ -47,7 +45,7 @@ void SessionHand::begin(std::shared_ptr<Method> method, const ServoSettings& set
     cycle_ = free_cycle_.get();
   }
   counted_.emplace(cycle_->reader());
-  if (on_tick_) told_.emplace(cycle_->reader());
+  run_.emplace(cycle_->reader());
 }
 
 void SessionHand::link(std::span<const std::unique_ptr<SessionHand>> hands) {
@@ -59,9 +57,10 @@ void SessionHand::link(std::span<const std::unique_ptr<SessionHand>> hands) {
                                          : std::numeric_limits<double>::infinity());
 }
 
-void SessionHand::run_at(double t) {
+std::optional<ServoTick> SessionHand::run_at(double t) {
   cycle_->run({.t = t});
-  if (ServoTick record{}; told_ && told_->try_pop(record)) on_tick_(record);
+  ServoTick record{};
+  return run_->try_pop(record) ? std::optional(record) : std::nullopt;
 }
 
 void SessionHand::count(std::span<const std::shared_ptr<const Cloud>> cameras, double r_c) {

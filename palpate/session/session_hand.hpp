@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -24,9 +23,7 @@ class SessionHand {
   /// @param name       for messages and topics
   /// @param device     must not be null
   /// @param placement  of this device; the session's settings give the rest
-  /// @param on_tick    see `tell`; may be empty
-  SessionHand(std::string name, std::unique_ptr<Device> device, const Placement& placement,
-              std::function<void(const ServoTick&)> on_tick = {});
+  SessionHand(std::string name, std::unique_ptr<Device> device, const Placement& placement);
   /// Leaves loop and device to a thread of their own if a cycle hangs.
   ~SessionHand();
 
@@ -47,8 +44,8 @@ class SessionHand {
   /// Null where no clock drives the cycle.
   [[nodiscard]] ServoLoop* loop() const { return loop_.get(); }
 
-  /// Runs a tick at `t` [s] and tells `on_tick` of it. Free-running alone.
-  void run_at(double t);
+  /// Runs a tick at `t` [s] and returns it. Free-running alone.
+  std::optional<ServoTick> run_at(double t);
   /// Reads the ticks that came since the last call and counts them; of the newest one, whether its
   /// proxy is behind what the cameras see. Any thread, one at a time.
   void count(std::span<const std::shared_ptr<const Cloud>> cameras, double r_c);
@@ -58,12 +55,11 @@ class SessionHand {
   std::string name_;
   std::unique_ptr<Device> device_;
   MouseDevice* mouse_;
-  LinkedDevice* linked_ = nullptr;     // the same as device_, if it is one
-  std::unique_ptr<ServoLoop> loop_;    // in real time
-  std::unique_ptr<Cycle> free_cycle_;  // free-running
-  Cycle* cycle_ = nullptr;             // of one of these
-  std::function<void(const ServoTick&)> on_tick_;
-  std::optional<TickRing<ServoTick>::Reader> told_;  // of on_tick_
+  LinkedDevice* linked_ = nullptr;                  // the same as device_, if it is one
+  std::unique_ptr<ServoLoop> loop_;                 // in real time
+  std::unique_ptr<Cycle> free_cycle_;               // free-running
+  Cycle* cycle_ = nullptr;                          // of one of these
+  std::optional<TickRing<ServoTick>::Reader> run_;  // of run_at
 
   mutable std::mutex mutex_;
   std::optional<TickRing<ServoTick>::Reader> counted_;  // guarded by mutex_

@@ -8,16 +8,8 @@ import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import {
-  difference,
-  distance,
-  drawn,
-  glimpse,
-  launch,
-  placeOf,
-  placeWhere,
-  Program,
-  spotUnder,
-  wallPly,
+  difference, distance, drawn, drop, glimpse, hide, launch, newest, placeOf, placeWhere, pressDown,
+  Program, says, slide, spotUnder, wallPly,
 } from "./session";
 import { ball, glbOf } from "../tests/splats";
 
@@ -29,6 +21,13 @@ const r_c = 0.005; // [m] the proxy's radius
 let browser: Browser;
 let program: Program | null = null;
 const faults: string[] = [];
+const folders: string[] = [];
+
+/** A folder for a test, gone with it. */
+function temporary(): string {
+  folders.push(mkdtempSync(join(tmpdir(), "palpate-page-")));
+  return folders.at(-1)!;
+}
 
 async function open(options: string[], width = 900, height = 600): Promise<Page> {
   program ??= await Program.start(options);
@@ -43,6 +42,11 @@ async function open(options: string[], width = 900, height = 600): Promise<Page>
 const until = (page: Page, what: (seen: Awaited<ReturnType<typeof glimpse>>) => boolean) =>
   expect.poll(async () => what(await glimpse(page)), { interval: 100 }).toBe(true);
 
+async function picture(page: Page, name: string): Promise<void> {
+  const folder = process.env.PALPATE_PICTURES;
+  if (folder) await page.screenshot({ path: join(folder, `${name}.png`) });
+}
+
 beforeAll(async () => {
   browser = await launch();
 });
@@ -50,6 +54,7 @@ afterEach(async () => {
   for (const context of browser.contexts()) await context.close();
   await program?.stop();
   program = null;
+  for (const folder of folders.splice(0)) rmSync(folder, { recursive: true });
   expect(faults.splice(0)).toEqual([]);
 });
 afterAll(() => browser.close());
@@ -93,9 +98,7 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
   expect((await tool()).reach).toBeCloseTo(Math.hypot(20, 10, 2.5) / 1000, 6);
 
   // Flat on a plane: its middle rests half its thickness above it.
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  const at = await pressDown(page);
   await until(page, (seen) => seen.force > 1 && Math.abs(seen.proxy[2]! - 0.0025) < 0.002);
   const before = await tool();
   expect(before.proxy).not.toBeNull();
@@ -104,11 +107,10 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
   // Turned while it presses: the plane keeps it flat, which is a torque.
   await page.keyboard.down("g");
   await page.mouse.move(at.x, at.y + 60, { steps: 6 });
-  if (process.env.PALPATE_PICTURES)
-    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "tool.png") });
+  await picture(page, "tool");
   await expect.poll(async () => Math.hypot(...(await tool()).torque)).toBeGreaterThan(0.02);
   await expect.poll(async () => (await tool()).ring).toBe(true);
-  await expect.poll(() => page.locator("#torque").textContent()).toMatch(/^[1-9]\d+ mN m$/);
+  await says(page, "#torque", /^[1-9]\d+ mN m$/);
   expect((await tool()).proxy).not.toBeNull();
   // 60 pixels are 0.3 rad, to which the hand turns smoothly.
   const angle = async () => 2 * Math.asin(Math.hypot(...(await tool()).orientation.slice(0, 3)));
@@ -135,8 +137,7 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
 
   // In the air a drag with the key turns it, and touches nothing.
   await page.keyboard.down("g");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page, at);
   await page.mouse.move(at.x + 40, at.y, { steps: 4 });
   await expect
     .poll(async () => Math.abs((await tool()).orientation[3] - turned.orientation[3]))
@@ -159,7 +160,7 @@ test("a press touches the spot that is pointed at, a drag slides, release lets g
   await page.mouse.move(at.x, at.y);
   await expect.poll(() => page.locator("#view").getAttribute("data-over")).toBe("surface");
   await page.mouse.down();
-  await expect.poll(() => page.locator("#hand").textContent()).toContain("you have the hand");
+  await says(page, "#hand", "you have the hand");
   await until(page, (seen) => seen.state !== 0 && seen.force > 1.2 && seen.arrow);
   const pressed = await glimpse(page);
   const spot = await spotUnder(page, at);
@@ -172,12 +173,8 @@ test("a press touches the spot that is pointed at, a drag slides, release lets g
   await expect.poll(written).toBeGreaterThan(1.2);
   expect(await page.locator("#state").textContent()).toMatch(/contact|entrenched/);
   // A press of 2 N is one of 3.3 mm into the surface.
-  await expect
-    .poll(() => page.locator("#detail").textContent())
-    .toMatch(/^hand 3\.\d mm inside$/);
-  await expect
-    .poll(() => page.locator("#why").textContent())
-    .toMatch(/^Stiffness 600 N\/m times 3/);
+  await says(page, "#detail", /^hand 3\.\d mm inside$/);
+  await says(page, "#why", /^Stiffness 600 N\/m times 3/);
   const plotted = async (index: number) => {
     const label = await page.locator(".plot .canvas").nth(index).getAttribute("aria-label");
     return parseFloat(/now (.*)/.exec(label ?? "")?.[1] ?? "");
@@ -205,15 +202,13 @@ test("a press touches the spot that is pointed at, a drag slides, release lets g
   expect(Math.abs((await glimpse(page)).proxy[2]! - r_c)).toBeLessThan(0.002);
 
   // The plot says the same.
-  await expect
-    .poll(() => page.locator("#detail").textContent())
-    .toMatch(/^hand [56]\.\d mm inside$/);
+  await says(page, "#detail", /^hand [56]\.\d mm inside$/);
   await expect.poll(async () => Math.abs((await plotted(1)) - 6)).toBeLessThan(1);
 
   await page.mouse.up();
   await until(page, (seen) => seen.force === 0);
-  await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
-  await expect.poll(() => page.locator("#why").textContent()).toMatch(/nobody holds.*disengaged/);
+  await says(page, "#hand", "hand free");
+  await says(page, "#why", /nobody holds.*disengaged/);
   // The hand is out again, above where it touched.
   await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
   const after = await glimpse(page);
@@ -225,8 +220,7 @@ test("a new visitor who opens, points and holds is in contact at once", async ()
   const page = await open([], 1280, 800);
   const at = await placeWhere(page, "surface");
   const began = await glimpse(page);
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page, at);
   await until(page, (seen) => seen.state !== 0);
   // Drawings, not seconds: a machine that draws nine a second has ten seconds for them.
   const touched = await glimpse(page);
@@ -251,8 +245,7 @@ test("a pointer held where nothing is seen presses what comes there", async () =
       else delete view.surfaceNear;
     }, nothing);
   await see(true);
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page, at);
   expect(await page.locator("#view").getAttribute("data-gesture")).toBe("turn");
   await see(false);
   await until(page, (seen) => seen.state !== 0);
@@ -280,15 +273,10 @@ test("whatever ends a press lets the hand go", async () => {
       page.locator("#view").dispatchEvent("pointercancel", { pointerId: 1 }),
     "the window loses the focus": () =>
       page.evaluate(() => window.dispatchEvent(new Event("blur"))),
-    "the tab is hidden": () =>
-      page.evaluate(() => {
-        Object.defineProperty(document, "hidden", { value: true, configurable: true });
-        document.dispatchEvent(new Event("visibilitychange"));
-      }),
+    "the tab is hidden": () => hide(page),
   };
   for (const [what, end] of Object.entries(ends)) {
-    await page.mouse.move(at.x, at.y);
-    await page.mouse.down();
+    await pressDown(page, at);
     await expect.poll(whose, { message: what }).toContain("you have the hand");
     await end();
     await expect.poll(whose, { message: what }).toContain("hand free");
@@ -312,9 +300,7 @@ test("a contact is heard and felt where that is asked for, and only then", async
     const vibrate = (pulse: number) => (window as any).pulses.push(pulse) > 0;
     Object.defineProperty(navigator, "vibrate", { value: vibrate, configurable: true });
   });
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page);
   await until(page, (seen) => seen.force > 0.5);
   const given = () =>
     page.evaluate(() => {
@@ -350,69 +336,50 @@ test("another scene is chosen on the page", async () => {
   const asked = (uri: string) => page.locator("#scene").selectOption(uri);
   expect(await page.locator("#scene").inputValue()).toBe(DESK[1]);
   await asked("synthetic:sphere");
-  await expect.poll(() => page.locator("#camera").textContent()).toContain("sphere");
+  await says(page, "#camera", "sphere");
   expect(await page.locator("#connection").textContent()).toBe("connected");
   expect(await page.locator("#role").textContent()).toBe("operator");
   await drawn(page);
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
   await page.mouse.up();
   // A file that is chosen, and one that is dropped, are touched; what cannot be is said.
-  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
-  try {
-    const file = join(folder, "a wall.ply");
-    writeFileSync(file, wallPly());
-    await page.setInputFiles("#file", file);
-    await expect.poll(() => page.locator("#camera").textContent()).toContain("a_wall.ply");
-    await drawn(page);
-    const faces = () =>
-      page.evaluate(() =>
-        [...(window as any).palpate.view.clouds.values()].map(
-          ({ faces }: any) => faces.visible && faces.geometry.index.count,
-        ),
-      );
-    expect(await faces()).toEqual([3 * 2 * 120 * 120]);
-    const chosen = await page.locator("#scene").inputValue();
-    expect(chosen).toMatch(/^ply:.*a_wall\.ply$/);
-    const drop = (name: string, text: string) =>
-      page.evaluate(
-        ({ name, text }) => {
-          const dataTransfer = new DataTransfer();
-          dataTransfer.items.add(new File([text], name));
-          for (const kind of ["dragover", "drop"])
-            document.body.dispatchEvent(
-              new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }),
-            );
-        },
-        { name, text },
-      );
-    const toast = () => page.locator("#toast").textContent();
-    await drop("song.mp3", "la");
-    await expect.poll(toast).toContain("song.mp3: cannot be opened");
-    await drop("broken.ply", "ply\nformat nonsense\n");
-    // Why it is refused, which comes with the session before, not that it is sent or has arrived
-    await expect.poll(toast).toContain("broken.ply:");
-    await expect.poll(() => page.locator("#scene").inputValue()).toBe(chosen);
-    await drop("another.ply", wallPly());
-    await expect.poll(() => page.locator("#camera").textContent()).toContain("another.ply");
-    expect(await page.locator("#scene optgroup[label='Opened last'] option").allTextContents())
-      .toEqual(["another.ply", "a_wall.ply"]);
-    // A face is pressed where it is, far from its corners.
-    await drop("sheet.ply", SHEET_PLY);
-    await expect.poll(() => page.locator("#camera").textContent()).toContain("sheet.ply");
-    const pressed = () => placeWhere(page, "surface").catch(() => null);
-    await expect.poll(pressed).not.toBeNull();
-    const spot = await spotUnder(page, (await pressed())!);
-    expect(Math.abs(spot[2]!)).toBeLessThan(1e-4);
-    expect(Math.max(Math.abs(spot[0]!), Math.abs(spot[1]!))).toBeLessThan(0.12);
-  } finally {
-    rmSync(folder, { recursive: true });
-  }
+  const folder = temporary();
+  const file = join(folder, "a wall.ply");
+  writeFileSync(file, wallPly());
+  await page.setInputFiles("#file", file);
+  await says(page, "#camera", "a_wall.ply");
+  await drawn(page);
+  const faces = () =>
+    page.evaluate(() =>
+      [...(window as any).palpate.view.clouds.values()].map(
+        ({ faces }: any) => faces.visible && faces.geometry.index.count,
+      ),
+    );
+  expect(await faces()).toEqual([3 * 2 * 120 * 120]);
+  const chosen = await page.locator("#scene").inputValue();
+  expect(chosen).toMatch(/^ply:.*a_wall\.ply$/);
+  await drop(page, "song.mp3", "la");
+  await says(page, "#toast", "song.mp3: cannot be opened");
+  await drop(page, "broken.ply", "ply\nformat nonsense\n");
+  // Why it is refused, which comes with the session before, not that it is sent or has arrived
+  await says(page, "#toast", "broken.ply:");
+  await expect.poll(() => page.locator("#scene").inputValue()).toBe(chosen);
+  await drop(page, "another.ply", wallPly());
+  await says(page, "#camera", "another.ply");
+  expect(await page.locator("#scene optgroup[label='Opened last'] option").allTextContents())
+    .toEqual(["another.ply", "a_wall.ply"]);
+  // A face is pressed where it is, far from its corners.
+  await drop(page, "sheet.ply", SHEET_PLY);
+  await says(page, "#camera", "sheet.ply");
+  const pressed = () => placeWhere(page, "surface").catch(() => null);
+  await expect.poll(pressed).not.toBeNull();
+  const spot = await spotUnder(page, (await pressed())!);
+  expect(Math.abs(spot[2]!)).toBeLessThan(1e-4);
+  expect(Math.max(Math.abs(spot[0]!), Math.abs(spot[1]!))).toBeLessThan(0.12);
   // Back to what the program was started with.
   await asked(DESK[1]!);
-  await expect.poll(() => page.locator("#camera").textContent()).toContain("desk?size=320x240");
+  await says(page, "#camera", "desk?size=320x240");
   faults.splice(0); // what the browser says of the connection that ends between two sessions
 });
 
@@ -428,9 +395,7 @@ test("a splat is drawn as one, touched on all sides, and brought to its size", a
   expect(await showsFelt()).toBe(false);
   await expect.poll(async () => (await glimpse(page)).points).toBe(6000);
   const press = async () => {
-    const at = await placeWhere(page, "surface");
-    await page.mouse.move(at.x, at.y);
-    await page.mouse.down();
+    await pressDown(page);
     await until(page, (seen) => seen.state !== 0 && seen.force > 1);
     const { proxy } = await glimpse(page);
     await page.mouse.up();
@@ -493,7 +458,7 @@ test("the keyboard alone moves the hand and the view", async () => {
   await until(page, (seen) => seen.state !== 0);
   await page.keyboard.up("KeyE");
   await page.keyboard.press("Space");
-  await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+  await says(page, "#hand", "hand free");
   const orbit = () => page.evaluate(() => (window as any).palpate.view.orbit.yaw as number);
   const yaw = await orbit();
   await page.keyboard.down("Shift");
@@ -510,19 +475,15 @@ test("the keyboard alone moves the hand and the view", async () => {
 test("a lost connection is shown and heals", async () => {
   const page = await open(DESK);
   const port = program!.port;
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
-  await expect.poll(() => page.locator("#hand").textContent()).toContain("you have the hand");
+  await pressDown(page);
+  await says(page, "#hand", "you have the hand");
   await program!.stop("SIGKILL");
-  await expect.poll(() => page.locator("#connection").textContent()).toBe("reconnecting");
+  await says(page, "#connection", /^reconnecting$/);
   expect(await page.locator("#toast").isVisible()).toBe(true);
   program = await Program.start(DESK, port);
-  await expect
-    .poll(() => page.locator("#connection").textContent())
-    .toBe("connected");
+  await says(page, "#connection", /^connected$/);
   expect(await page.locator("#toast").isVisible()).toBe(false);
-  await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+  await says(page, "#hand", "hand free");
   const { drawings } = await glimpse(page);
   await until(page, (seen) => seen.drawings > drawings + 3);
   // What the browser itself says about a connection that was refused is no fault of the page.
@@ -532,12 +493,9 @@ test("a lost connection is shown and heals", async () => {
 test("what one page sets, all pages show", async () => {
   const page = await open(DESK);
   const other = await open(DESK);
-  await expect.poll(() => other.locator("#hand").textContent()).toContain("2 viewers");
+  await says(other, "#hand", "2 viewers");
   await page.getByRole("tab", { name: "Method" }).click();
-  await page.locator("#parameters-stiffness").evaluate((slider: HTMLInputElement) => {
-    slider.value = "0";
-    slider.dispatchEvent(new Event("input"));
-  });
+  await slide(page, "#parameters-stiffness", 0);
   await page.locator("#method-name").selectOption("fixed-step");
   await other.getByRole("tab", { name: "Method" }).click();
   await expect.poll(() => other.locator("#method-name").inputValue()).toBe("fixed-step");
@@ -547,10 +505,7 @@ test("what one page sets, all pages show", async () => {
   await expect.poll(() => other.locator("#method-name").inputValue()).toBe("sight");
   // Where the hand is in the scene, too.
   await page.getByRole("tab", { name: "Session" }).click();
-  await page.locator("#placement-scale").evaluate((slider: HTMLInputElement) => {
-    slider.value = "1000";
-    slider.dispatchEvent(new Event("input"));
-  });
+  await slide(page, "#placement-scale", 1000);
   await other.getByRole("tab", { name: "Session" }).click();
   await expect.poll(() => other.getByLabel("scale,").inputValue()).toBe("1000");
 });
@@ -626,48 +581,37 @@ describe.each([
 
 test("a brush paints what is touched, which then feels like that", async () => {
   const page = await open(PLANE);
-  const paint = () =>
-    page.evaluate(() => (window as any).palpate.newest().state.paint as { dabs: unknown[] });
+  const dabs = async () => (await newest(page)).state.paint.dabs.length as number;
   await page.locator("[data-tab=method]").first().click();
   await page.locator("#brush-material").selectOption("foam");
   await page.locator("#brush-radius").fill("30");
   await page.locator("#brush-radius").press("Enter");
-  await expect.poll(() => page.locator("#brush-about").textContent()).toContain("painted");
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
-  await expect.poll(async () => (await paint()).dabs.length).toBeGreaterThan(0);
+  await says(page, "#brush-about", "painted");
+  const at = await pressDown(page);
+  await expect.poll(dabs).toBeGreaterThan(0);
   await page.mouse.move(at.x + 25, at.y + 5, { steps: 5 });
-  await expect.poll(async () => (await paint()).dabs.length).toBeGreaterThan(1);
+  await expect.poll(dabs).toBeGreaterThan(1);
   await page.mouse.up();
   await until(page, (seen) => seen.state === 0);
 
   // Foam has 120 N/m; the plane has 600.
   await page.locator("#brush-material").selectOption("none");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page, at);
   await until(page, ({ state, force, hip, proxy }) => {
     const depth = distance(hip, proxy) - r_c;
     return state !== 0 && depth > 0.002 && force / depth > 90 && force / depth < 160;
   });
   await page.mouse.up();
   await page.locator("#brush-clear").click();
-  await expect.poll(async () => (await paint()).dabs.length).toBe(0);
+  await expect.poll(dabs).toBe(0);
 });
 
 test("the operator keeps the hand off what it has touched", async () => {
   const page = await open(PLANE);
-  const names = () =>
-    page.evaluate(() =>
-      (window as any).palpate.newest().state.fixtures.map(({ name }: { name: string }) => name),
-    );
+  const names = async () => (await newest(page)).state.fixtures.map(({ name }: any) => name);
   await page.locator("[data-tab=method]").first().click();
   const at = await placeWhere(page, "surface");
-  const touch = async () => {
-    await page.mouse.move(at.x, at.y);
-    await page.mouse.down();
-  };
-  await touch();
+  await pressDown(page, at);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
   await page.mouse.up();
   await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
@@ -676,7 +620,7 @@ test("the operator keeps the hand off what it has touched", async () => {
   await expect.poll(names).toEqual(["keep off 1"]);
   expect(await page.locator("#fixture-list").textContent()).toContain("forbidden, seen");
   // It pushes before the surface does. The hand is soon through: what the plots keep tells.
-  const now = () => page.evaluate(() => (window as any).palpate.newest().tick.t as number);
+  const now = async () => (await newest(page)).tick.t as number;
   const pushedAbove = (since: number) =>
     page.evaluate((since) => {
       const above = ({ t, force, penetration }: any) =>
@@ -684,14 +628,14 @@ test("the operator keeps the hand off what it has touched", async () => {
       return (window as any).palpate.history().some(above);
     }, since);
   const guarded = await now();
-  await touch();
+  await pressDown(page, at);
   await expect.poll(() => pushedAbove(guarded), { interval: 100 }).toBe(true);
   await page.mouse.up();
   await until(page, (seen) => seen.state === 0 && seen.force === 0 && seen.hip[2]! > 0.02);
   await page.locator("#fixture-list button").click();
   await expect.poll(names).toEqual([]);
   const free = await now();
-  await touch();
+  await pressDown(page, at);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3 && seen.hip[2]! < 0);
   expect(await pushedAbove(free)).toBe(false);
   await page.mouse.up();
@@ -699,16 +643,9 @@ test("the operator keeps the hand off what it has touched", async () => {
 
 test("the operator makes a guide of what the hand has stroked", async () => {
   const page = await open(PLANE);
-  const fixtures = () =>
-    page.evaluate(() =>
-      (window as any).palpate
-        .newest()
-        .state.fixtures.map(({ name, shape, points }: any) => [name, shape, points.length]),
-    );
+  const fixtures = async () => (await newest(page)).state.fixtures;
   await page.locator("[data-tab=method]").first().click();
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  const at = await pressDown(page);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
   for (let i = 1; i <= 20; ++i) await page.mouse.move(at.x + 3 * i, at.y);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.1);
@@ -716,12 +653,11 @@ test("the operator makes a guide of what the hand has stroked", async () => {
   await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
   await page.locator("#guide").click();
   await expect.poll(async () => (await fixtures()).length).toBe(1);
-  const [[name, shape, points]] = (await fixtures()) as [[string, string, number]];
-  expect([name, shape]).toEqual(["stroke 1", "path"]);
-  expect(points).toBeGreaterThan(3);
+  const [guide] = await fixtures();
+  expect(guide).toMatchObject({ name: "stroke 1", shape: "path" });
+  expect(guide.points.length).toBeGreaterThan(3);
   expect(await page.locator("#fixture-list").textContent()).toContain("guide, path");
-  if (process.env.PALPATE_PICTURES)
-    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "guide.png") });
+  await picture(page, "guide");
 });
 
 test("a second hand of the session is drawn and said", async () => {
@@ -736,12 +672,9 @@ test("a second hand of the session is drawn and said", async () => {
   expect(drawn.length).toBe(1);
   expect(Math.hypot(...drawn[0]!)).toBeGreaterThan(0);
   // The mouse's hand is the first one's, as ever.
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
-  if (process.env.PALPATE_PICTURES)
-    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "two_hands.png") });
+  await picture(page, "two_hands");
   await page.mouse.up();
 });
 
@@ -754,19 +687,16 @@ test("the hand leads a tool at the other end of a link, and sees where it is", a
   const page = await open([]);
   const tool = () => placeOf(page, "tool");
   await expect.poll(tool).not.toBeNull();
-  const at = await placeWhere(page, "surface");
-  await page.mouse.move(at.x, at.y);
-  await page.mouse.down();
+  await pressDown(page);
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
-  await expect.poll(() => page.locator("#robot").textContent()).toContain("robot follows commands");
+  await says(page, "#robot", "robot follows commands");
   // The tool comes to the proxy, and stays on the surface as that does.
   await expect
     .poll(async () => distance((await tool())!, (await glimpse(page)).proxy))
     .toBeLessThan(0.006);
-  if (process.env.PALPATE_PICTURES)
-    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "teleop.png") });
+  await picture(page, "teleop");
   await page.mouse.up();
-  await expect.poll(() => page.locator("#robot").textContent()).toContain("no operator commands");
+  await says(page, "#robot", "no operator commands");
 });
 
 test("without the operator's link a page is greyed out and may hold the hand", async () => {
@@ -779,7 +709,7 @@ test("without the operator's link a page is greyed out and may hold the hand", a
   const viewer = await browser.newPage({ viewport: { width: 900, height: 600 } });
   await viewer.goto(program!.viewersUrl);
   await drawn(viewer);
-  await expect.poll(() => viewer.locator("#role").textContent()).toBe("looking on");
+  await says(viewer, "#role", /^looking on$/);
   expect(await viewer.locator("#record").isDisabled()).toBe(true);
   expect(await viewer.locator("#record").getAttribute("title")).toContain("Only the operator");
   await viewer.getByRole("tab", { name: "Method" }).click();
@@ -790,23 +720,17 @@ test("without the operator's link a page is greyed out and may hold the hand", a
   // Whoever holds the hand sets parameters, and may make limits stricter but not looser.
   await viewer.locator("#view").focus();
   await viewer.keyboard.press("Space");
-  await expect.poll(() => viewer.locator("#role").textContent()).toBe("hand holder");
+  await says(viewer, "#role", /^hand holder$/);
   await expect.poll(() => viewer.locator("#parameters-stiffness").isEnabled()).toBe(true);
   expect(await viewer.locator("#method-name").isDisabled()).toBe(true);
   await viewer.getByRole("tab", { name: "Safety" }).click();
   expect(await viewer.locator("#limits-fall_rate").isDisabled()).toBe(true);
-  const set = (value: string) =>
-    viewer.locator("#limits-max_device_force").evaluate((slider: HTMLInputElement, to) => {
-      slider.value = to;
-      slider.dispatchEvent(new Event("input"));
-    }, value);
-  const force = () =>
-    viewer.evaluate(() => (window as any).palpate.newest().state.safety.max_device_force as number);
+  const force = async () => (await newest(viewer)).state.safety.max_device_force as number;
   const started = await force();
-  await set("1000");
-  await expect.poll(() => viewer.locator("#toast").textContent()).toContain("the operator's");
+  await slide(viewer, "#limits-max_device_force", 1000);
+  await says(viewer, "#toast", "the operator's");
   expect(await force()).toBe(started);
-  await set("0");
+  await slide(viewer, "#limits-max_device_force", 0);
   await expect.poll(force).toBeLessThan(started);
 });
 
@@ -815,8 +739,7 @@ test("a number field takes numbers, and what is refused goes back", async () => 
   await page.getByRole("tab", { name: "Method" }).click();
   const first = page.locator("#parameters input[type=number]").first();
   expect(await first.getAttribute("aria-label")).toBe("stiffness, N/m");
-  const stiffness = () =>
-    page.evaluate(() => (window as any).palpate.newest().state.parameters.stiffness as number);
+  const stiffness = async () => (await newest(page)).state.parameters.stiffness as number;
   await expect.poll(() => first.inputValue()).toBe("600");
   await first.fill("");
   await first.press("Enter");
@@ -827,7 +750,7 @@ test("a number field takes numbers, and what is refused goes back", async () => 
   // Beyond its range: refused, and the field shows again what holds, while it has the focus.
   await first.fill("1e9");
   await first.press("Enter");
-  await expect.poll(() => page.locator("#toast").textContent()).toContain("stiffness");
+  await says(page, "#toast", "stiffness");
   await expect.poll(() => first.inputValue()).toBe("700");
   await first.fill("5");
   await first.press("Escape");
@@ -837,14 +760,13 @@ test("a number field takes numbers, and what is refused goes back", async () => 
 
 test("a wrong or missing token is said on the page", async () => {
   program = await Program.start([...DESK, "--token", "of-the-viewers"]);
-  const toast = (page: Page) => page.locator("#toast").textContent();
   for (const [query, said] of [
     ["", "lacks its token"],
     ["?token=of-somebody-else", "is wrong or of an earlier session"],
   ] as const) {
     const page = await browser.newPage();
     await page.goto(`http://localhost:${program.port}/${query}`);
-    await expect.poll(() => toast(page)).toContain(said);
+    await says(page, "#toast", said);
     expect(await page.locator("#connection").textContent()).toBe("refused");
     await page.close();
   }
@@ -853,7 +775,7 @@ test("a wrong or missing token is said on the page", async () => {
   program = await Program.start(DESK);
   const page = await browser.newPage();
   await page.goto(new URL("?token=of-an-earlier-session", program.viewersUrl).href);
-  await expect.poll(() => toast(page)).toContain("is for viewing only");
+  await says(page, "#toast", "is for viewing only");
 });
 
 test("help opens at its beginning", async () => {
@@ -873,122 +795,98 @@ test("help opens at its beginning", async () => {
 });
 
 test("a recording is paused, touched and gone through; jumps take the force away", async () => {
-  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
-  try {
-    const made = join(folder, "made");
-    const camera = ["--camera", "synthetic:plane?size=160x120"];
-    const words = ["run", "--headless", "--duration", "4", ...camera, "--record", made];
-    execFileSync(process.env.PALPATE!, words, { stdio: "ignore" });
-    const page = await open(["--camera", `recording:${made}`]);
-    const cameraState = () =>
-      page.evaluate(() => (window as any).palpate.newest().state.cameras[0]);
-    expect((await cameraState()).frames).toBe(120);
-    await page.click("#play");
-    await expect.poll(() => page.locator("#timeline").getAttribute("data-paused")).toBe("true");
-    await expect
-      .poll(() => page.evaluate(() => (window as any).palpate.newest().state.playback.paused))
-      .toBe(true);
-    // A frame that was on its way may still come.
-    let place = -1;
-    const isStill = async () => {
-      const before = place;
-      place = (await cameraState()).place;
-      return place === before;
-    };
-    await expect.poll(isStill, { interval: 1000 }).toBe(true);
-    const ghost = () => placeOf(page, "ghost");
-    await expect.poll(ghost).not.toBeNull();
+  const folder = temporary();
+  const made = join(folder, "made");
+  const camera = ["--camera", "synthetic:plane?size=160x120"];
+  const words = ["run", "--headless", "--duration", "4", ...camera, "--record", made];
+  execFileSync(process.env.PALPATE!, words, { stdio: "ignore" });
+  const page = await open(["--camera", `recording:${made}`]);
+  const cameraState = async () => (await newest(page)).state.cameras[0];
+  expect((await cameraState()).frames).toBe(120);
+  await page.click("#play");
+  await expect.poll(() => page.locator("#timeline").getAttribute("data-paused")).toBe("true");
+  await expect.poll(async () => (await newest(page)).state.playback.paused).toBe(true);
+  // A frame that was on its way may still come.
+  let place = -1;
+  const isStill = async () => {
+    const before = place;
+    place = (await cameraState()).place;
+    return place === before;
+  };
+  await expect.poll(isStill, { interval: 1000 }).toBe(true);
+  const ghost = () => placeOf(page, "ghost");
+  await expect.poll(ghost).not.toBeNull();
 
-    // What is paused can be touched.
-    const at = await placeWhere(page, "surface");
-    await page.mouse.move(at.x, at.y);
-    await page.mouse.down();
-    await until(page, (seen) => seen.force > 1);
-    expect((await cameraState()).place).toBe(place);
+  // What is paused can be touched.
+  await pressDown(page);
+  await until(page, (seen) => seen.force > 1);
+  expect((await cameraState()).place).toBe(place);
 
-    // A jump in time takes the force away, and it ramps up again.
-    const gain = () => page.evaluate(() => (window as any).palpate.newest().tick.gain as number);
-    expect(await gain()).toBeGreaterThan(0.5);
-    const goTo = async (frame: number) => {
-      await page.evaluate((value) => {
-        const slider = document.getElementById("place") as HTMLInputElement;
-        slider.value = value;
-        slider.dispatchEvent(new Event("input"));
-      }, String(frame));
-      await expect.poll(async () => (await cameraState()).place).toBe(frame);
+  // A jump in time takes the force away, and it ramps up again.
+  expect((await newest(page)).tick.gain).toBeGreaterThan(0.5);
+  const goTo = async (frame: number) => {
+    await slide(page, "#place", frame);
+    await expect.poll(async () => (await cameraState()).place).toBe(frame);
+  };
+  await page.evaluate(() => {
+    (window as any).gains = [];
+    const note = () => {
+      (window as any).gains.push((window as any).palpate.newest().tick.gain);
+      requestAnimationFrame(note);
     };
-    await page.evaluate(() => {
-      (window as any).gains = [];
-      const note = () => {
-        (window as any).gains.push((window as any).palpate.newest().tick.gain);
-        requestAnimationFrame(note);
-      };
-      note();
-    });
-    await goTo(100);
-    await expect
-      .poll(() => page.evaluate(() => Math.min(...(window as any).gains)))
-      .toBeLessThan(0.3);
-    await until(page, (seen) => seen.force > 1);
-    await page.mouse.up();
-    // The recorded hand goes along: from above the plane, where it began, into it.
-    const late = (await ghost())!;
-    await goTo(0);
-    await expect.poll(async () => (await ghost())![2]! - late[2]!).toBeGreaterThan(0.005);
-    await goTo(100);
-    await page.locator("#speed").selectOption("0.5");
-    await page.keyboard.press("k");
-    await expect.poll(async () => (await cameraState()).place).not.toBe(100);
-  } finally {
-    rmSync(folder, { recursive: true });
-  }
+    note();
+  });
+  await goTo(100);
+  await expect
+    .poll(() => page.evaluate(() => Math.min(...(window as any).gains)))
+    .toBeLessThan(0.3);
+  await until(page, (seen) => seen.force > 1);
+  await page.mouse.up();
+  // The recorded hand goes along: from above the plane, where it began, into it.
+  const late = (await ghost())!;
+  await goTo(0);
+  await expect.poll(async () => (await ghost())![2]! - late[2]!).toBeGreaterThan(0.005);
+  await goTo(100);
+  await page.locator("#speed").selectOption("0.5");
+  await page.keyboard.press("k");
+  await expect.poll(async () => (await cameraState()).place).not.toBe(100);
 });
 
 test("a recording ends at its limit, and the page says so", async () => {
-  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
-  try {
-    const limits = ["--record-folder", join(folder, "made"), "--record-limit", "0.001"];
-    const page = await open([...DESK, ...limits]);
-    await page.click("#record");
-    const pressed = () => page.locator("#record").getAttribute("aria-pressed");
-    await expect.poll(pressed).toBe("true");
-    await expect
-      .poll(() => page.locator("#toast").textContent())
-      .toContain("reached 1 MB");
-    await expect.poll(pressed).toBe("false");
-    expect(readdirSync(join(folder, "made"))).toHaveLength(1);
-  } finally {
-    rmSync(folder, { recursive: true });
-  }
+  const folder = temporary();
+  const limits = ["--record-folder", join(folder, "made"), "--record-limit", "0.001"];
+  const page = await open([...DESK, ...limits]);
+  await page.click("#record");
+  const pressed = () => page.locator("#record").getAttribute("aria-pressed");
+  await expect.poll(pressed).toBe("true");
+  await says(page, "#toast", "reached 1 MB");
+  await expect.poll(pressed).toBe("false");
+  expect(readdirSync(join(folder, "made"))).toHaveLength(1);
 });
 
 test("the record button records what a replay gives again, bit for bit", async () => {
-  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
-  try {
-    // A hand of the program's own, which touches all the time.
-    program = await Program.start([...DESK, "--device", "hand:"], 0, folder);
-    const page = await open([]);
-    const pressed = () => page.locator("#record").getAttribute("aria-pressed");
-    await until(page, (seen) => seen.state !== 0);
-    expect(await pressed()).toBe("false");
-    await page.click("#record");
-    await expect.poll(pressed).toBe("true");
-    expect(await page.locator("#record").getAttribute("title")).toContain("Recording palpate_");
-    const { frame } = await glimpse(page);
-    await until(page, (seen) => seen.frame > frame + 20);
-    expect(await page.locator("#record").textContent()).toMatch(/\d:\d\d · \d+ MB/);
-    await page.click("#record");
-    await expect.poll(pressed).toBe("false");
-    // It is written to its end while the session goes on.
-    const title = () => page.locator("#record").getAttribute("title");
-    await expect.poll(title).toMatch(/\d+ ticks, \d+ frames/);
-    const [bag] = readdirSync(folder);
-    const said = execFileSync(process.env.PALPATE!, ["replay", "--json", join(folder, bag!)]);
-    expect(JSON.parse(said.toString())).toMatchObject({ identical: true });
-    expect(JSON.parse(said.toString()).ticks).toBeGreaterThan(100);
-    await page.click("#open-recording");
-    await expect.poll(() => page.locator("#camera").textContent()).toContain(bag!);
-  } finally {
-    rmSync(folder, { recursive: true });
-  }
+  const folder = temporary();
+  // A hand of the program's own, which touches all the time.
+  program = await Program.start([...DESK, "--device", "hand:"], 0, folder);
+  const page = await open([]);
+  const pressed = () => page.locator("#record").getAttribute("aria-pressed");
+  await until(page, (seen) => seen.state !== 0);
+  expect(await pressed()).toBe("false");
+  await page.click("#record");
+  await expect.poll(pressed).toBe("true");
+  expect(await page.locator("#record").getAttribute("title")).toContain("Recording palpate_");
+  const { frame } = await glimpse(page);
+  await until(page, (seen) => seen.frame > frame + 20);
+  expect(await page.locator("#record").textContent()).toMatch(/\d:\d\d · \d+ MB/);
+  await page.click("#record");
+  await expect.poll(pressed).toBe("false");
+  // It is written to its end while the session goes on.
+  const title = () => page.locator("#record").getAttribute("title");
+  await expect.poll(title).toMatch(/\d+ ticks, \d+ frames/);
+  const [bag] = readdirSync(folder);
+  const said = execFileSync(process.env.PALPATE!, ["replay", "--json", join(folder, bag!)]);
+  expect(JSON.parse(said.toString())).toMatchObject({ identical: true });
+  expect(JSON.parse(said.toString()).ticks).toBeGreaterThan(100);
+  await page.click("#open-recording");
+  await says(page, "#camera", bag!);
 });

@@ -9,6 +9,7 @@ import { tmpdir } from "node:os";
 import { extname, join } from "node:path";
 import { gzipSync } from "node:zlib";
 import { chromium, type Browser, type Page } from "playwright-core";
+import { expect } from "vitest";
 
 /** The program with its page, until stopped. */
 export class Program {
@@ -171,6 +172,58 @@ export function placeWhere(
       }
     throw new Error(`there is no ${wanted}`);
   }, wanted);
+}
+
+/** The newest tick and state that the page has. */
+export function newest(page: Page): Promise<any> {
+  return page.evaluate(() => (window as any).palpate.newest());
+}
+
+/** Waits until an element says something: a part of its text, or what a pattern says. */
+export function says(page: Page, element: string, what: string | RegExp): Promise<void> {
+  return expect.poll(() => page.locator(element).textContent()).toMatch(what);
+}
+
+/** The mouse goes down on a surface, or there. @return where */
+export async function pressDown(
+  page: Page,
+  there?: { x: number; y: number },
+): Promise<{ x: number; y: number }> {
+  const at = there ?? (await placeWhere(page, "surface"));
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  return at;
+}
+
+/** Moves a slider. */
+export function slide(page: Page, slider: string, to: number): Promise<void> {
+  return page.locator(slider).evaluate((slider: HTMLInputElement, to) => {
+    slider.value = String(to);
+    slider.dispatchEvent(new Event("input"));
+  }, to);
+}
+
+/** The page's tab is hidden from now on. */
+export function hide(page: Page): Promise<void> {
+  return page.evaluate(() => {
+    Object.defineProperty(document, "hidden", { value: true, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+  });
+}
+
+/** Drops a file onto the page. */
+export function drop(page: Page, name: string, content: string | Buffer): Promise<void> {
+  return page.evaluate(
+    ([name, base64]) => {
+      const dataTransfer = new DataTransfer();
+      const bytes = Uint8Array.from(atob(base64!), (letter) => letter.charCodeAt(0));
+      dataTransfer.items.add(new File([bytes], name!));
+      const given = { dataTransfer, bubbles: true, cancelable: true };
+      for (const kind of ["dragover", "drop"])
+        document.body.dispatchEvent(new DragEvent(kind, given));
+    },
+    [name, Buffer.from(content).toString("base64")],
+  );
 }
 
 /** Waits until the session is drawn. */

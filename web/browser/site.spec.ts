@@ -10,26 +10,30 @@ import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import type { Browser, Page } from "playwright-core";
 import { zipSync, zlibSync } from "fflate";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { InverseService } from "./inverse_service";
 import { ball, plyOf, spzOf } from "../tests/splats";
-import { drawn, glimpse, hosted, launch, placeWhere, wallPly } from "./session";
+import {
+  drawn, drop, glimpse, hide, hosted, launch, newest, placeWhere, pressDown, says, wallPly,
+} from "./session";
 
 const site = fileURLToPath(new URL("../../build/site", import.meta.url));
 const patience = 120_000; // [ms]
 let browser: Browser;
 let host: Server;
 let address = "";
+const faults: string[] = [];
 
-async function open(query = ""): Promise<{ page: Page; asked: string[]; faults: string[] }> {
+/** @param before  runs in the page before all else */
+async function open(query = "", before = () => {}): Promise<{ page: Page; asked: string[] }> {
   const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
   const asked: string[] = [];
-  const faults: string[] = [];
   page.on("request", (request) => asked.push(request.url()));
   page.on("pageerror", (error) => faults.push(String(error)));
+  await page.addInitScript(before);
   await page.goto(`${address}/index.html${query}`, { timeout: patience });
   await drawn(page);
-  return { page, asked, faults };
+  return { page, asked };
 }
 
 async function press(page: Page): Promise<void> {
@@ -139,6 +143,10 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     ({ host, address } = await hosted(site));
     browser = await launch();
   });
+  afterEach(async () => {
+    for (const context of browser.contexts()) await context.close();
+    expect(faults.splice(0)).toEqual([]);
+  });
   afterAll(async () => {
     await browser.close();
     host.close();
@@ -146,78 +154,57 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
   });
 
   test("a desk that a link names is pressed, and nobody else is asked for anything", async () => {
-    const { page, asked, faults } = await open("?scene=desk&material=wood&size=320x240");
-    const materials = () =>
-      page.evaluate(() => (window as any).palpate.newest().state.paint.materials);
-    expect(await materials()).toContain("wood");
+    const { page, asked } = await open("?scene=desk&material=wood&size=320x240");
+    expect((await newest(page)).state.paint.materials).toContain("wood");
     expect(asked.every((url) => url.startsWith(address))).toBe(true);
     await page.context().setOffline(true); // all that it needs is there
     await press(page);
     // What needs a server is said, with the command that gives it.
     expect(await page.locator("#toast").textContent()).toContain("scripts/run");
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("a file that a link names is touched", async () => {
-    const { page, faults } = await open("?file=cup/wall.ply");
+    const { page } = await open("?file=cup/wall.ply");
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("wall.ply");
     await drawn(page);
     await press(page);
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("a dropped file is touched, and a damaged one is refused in a sentence", async () => {
-    const { page, faults } = await open("?size=320x240");
+    const { page } = await open("?size=320x240");
     const choose = (name: string, text: string) =>
       page.setInputFiles("#file", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
     await choose("broken.ply", "ply\nformat nonsense\n");
-    await expect.poll(() => page.locator("#toast").textContent()).toContain("broken.ply");
+    await says(page, "#toast", "broken.ply");
     expect((await glimpse(page)).points).toBeGreaterThan(100); // the desk is still there
     await choose("wall.ply", wallPly());
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("wall.ply");
     await drawn(page);
     await press(page);
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("a dropped splat is drawn and met by the hand, as SPZ and as PLY", async () => {
-    const { page, faults } = await open("?size=320x240");
+    const { page } = await open("?size=320x240");
     const all = ball(20_000, 0.08);
     for (const [name, bytes] of [
       ["ball.spz", spzOf(all)],
       ["ball.ply", plyOf(all)],
     ] as const) {
-      await page.evaluate(
-        ([name, base64]) => {
-          const dataTransfer = new DataTransfer();
-          const bytes = Uint8Array.from(atob(base64!), (letter) => letter.charCodeAt(0));
-          dataTransfer.items.add(new File([bytes], name!));
-          const given = { dataTransfer, bubbles: true, cancelable: true };
-          document.body.dispatchEvent(new DragEvent("drop", given));
-        },
-        [name, bytes.toString("base64")],
-      );
+      await drop(page, name, bytes);
       await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain(name);
       await expect.poll(() => page.locator("#felt").isVisible(), { timeout: patience }).toBe(true);
       // One in four, as a processor draws.
       await expect.poll(async () => (await glimpse(page)).points).toBe(5000);
-      const at = await placeWhere(page, "surface");
-      await page.mouse.move(at.x, at.y);
-      await page.mouse.down();
+      await pressDown(page);
       await expect
         .poll(async () => (await glimpse(page)).state, { interval: 100, timeout: patience })
         .not.toBe(0);
       await page.mouse.up();
     }
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("a recording made in the page replays in the program and in the page", async () => {
-    const { page, faults } = await open("?scene=desk&size=160x120");
+    const { page } = await open("?scene=desk&size=160x120");
     await page.locator("#record").click();
     await expect.poll(() => page.locator("#record").getAttribute("aria-pressed")).toBe("true");
     await press(page);
@@ -236,8 +223,6 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     await page.setInputFiles("#file", file);
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain(".mcap");
     expect(await compared(page)).toContain(identically(hash));
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("a recording of the program replays in the page, to the bit", async () => {
@@ -246,31 +231,25 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     const options = ["run", "--headless", "--duration", "2", "--camera", camera];
     execFileSync(process.env.PALPATE!, [...options, "--record", folder], { stdio: "ignore" });
     const file = readdirSync(folder).find((name) => name.endsWith(".mcap"))!;
-    const { page, faults } = await open("?size=160x120");
+    const { page } = await open("?size=160x120");
     await page.setInputFiles("#file", join(folder, file));
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain(".mcap");
     const { hash } = replayed(folder);
     expect(await compared(page)).toContain(identically(hash));
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("the depth camera of a phone is touched, where its browser gives one", async () => {
-    const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
-    await page.addInitScript(simulatePhone);
-    await page.goto(`${address}/index.html?size=160x120`, { timeout: patience });
-    await drawn(page);
+    const { page } = await open("?size=160x120", simulatePhone);
     await page.locator("#webxr").click();
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("webxr:");
     await drawn(page);
     await press(page);
     await page.locator("#webxr").click();
     await expect.poll(() => page.locator("#webxr").getAttribute("aria-pressed")).toBe("false");
-    await page.close();
   });
 
   test("images in a zip are touched, and a damaged one is refused as by the program", async () => {
-    const { page, faults } = await open("?size=160x120");
+    const { page } = await open("?size=160x120");
     const png = depthPng(640, 480);
     const choose = (name: string, buffer: Buffer) =>
       page.setInputFiles("#file", { name, mimeType: "application/zip", buffer });
@@ -279,32 +258,25 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
       .poll(() => page.locator("#toast").textContent())
       .toContain("is a damaged PNG: it ends too early; copy or record it again, it may have");
     await choose("no.zip", Buffer.from("no zip"));
-    await expect.poll(() => page.locator("#toast").textContent()).toContain("no.zip");
+    await says(page, "#toast", "no.zip");
     await choose("wall.zip", tumZip(png));
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("tum:");
     await drawn(page);
     await press(page);
-    expect(faults).toEqual([]);
-    await page.close();
   });
 
   test("an Inverse3 leads the hand with at most 0.2 N, and none when it is hidden", async () => {
     const service = await new InverseService().start();
-    const { page, faults } = await open(`?scene=plane&size=160x120&inverse3=${service.address}`);
+    const { page } = await open(`?scene=plane&size=160x120&inverse3=${service.address}`);
     await page.locator("#inverse3").click();
     await expect.poll(() => service.largest(), { timeout: patience }).toBeGreaterThan(0.19);
     expect((await glimpse(page)).state).not.toBe(0);
-    await page.evaluate(() => {
-      Object.defineProperty(document, "hidden", { value: true, configurable: true });
-      document.dispatchEvent(new Event("visibilitychange"));
-    });
+    await hide(page);
     await expect.poll(() => Math.hypot(...service.forces.at(-1)!)).toBe(0);
     const messages = service.forces.length;
     expect(service.largest()).toBeLessThanOrEqual(0.2 + 1e-9);
     expect(await page.locator("#inverse3").getAttribute("aria-pressed")).toBe("false");
     expect(service.forces.length).toBe(messages); // nothing more is asked for
-    expect(faults).toEqual([]);
-    await page.close();
     service.stop();
   });
 
@@ -317,11 +289,10 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     await expect
       .poll(async () => (await glimpse(page)).force, { timeout: patience })
       .toBeGreaterThan(0.5);
-    await page.close();
   });
 
   test("a link leads to the same view, and after the first load without a network", async () => {
-    const { page, faults } = await open("?scene=desk&size=160x120");
+    const { page } = await open("?scene=desk&size=160x120");
     await page.evaluate(() => {
       const { view } = (window as any).palpate;
       view.setOrbit({ ...view.orbit, yaw: view.orbit.yaw + 0.5, distance: 0.8 });
@@ -338,8 +309,6 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     const after = await orbit();
     for (const key of ["yaw", "pitch", "distance"]) expect(after[key]).toBeCloseTo(before[key], 3);
     await press(page);
-    expect(faults).toEqual([]);
-    await page.close();
   });
 });
 
@@ -361,9 +330,7 @@ test.skipIf(!process.env.PALPATE_SITE_SPEED)(
       const paint = await page.evaluate(
         () => performance.getEntriesByName("first-contentful-paint")[0]!.startTime,
       );
-      const at = await placeWhere(page, "surface");
-      await page.mouse.move(at.x, at.y);
-      await page.mouse.down();
+      await pressDown(page);
       await page.waitForFunction(() =>
         ((window as any).palpate.newest().tick?.force ?? [0]).some((x: number) => x !== 0),
       );

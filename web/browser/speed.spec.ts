@@ -5,7 +5,7 @@
 
 import { existsSync } from "node:fs";
 import { test } from "vitest";
-import { drawn, glimpse, launch, placeWhere, Program } from "./session";
+import { drawn, glimpse, launch, pressDown, Program } from "./session";
 
 const wanted = (process.env.PALPATE_SPEED ?? "").split(" ").filter(Boolean);
 const MEASURED = 8; // [s]
@@ -35,9 +35,7 @@ test.skipIf(!wanted.length)(
           await drawn(page);
         }
         const seen = since();
-        const at = await placeWhere(page, "surface");
-        await page.mouse.move(at.x, at.y);
-        await page.mouse.down();
+        const at = await pressDown(page);
         const isFelt = async () => (await glimpse(page)).force > 0.1;
         while (!(await isFelt()) && Number(since()) < LONGEST) await page.waitForTimeout(50);
         const felt = since();

@@ -119,10 +119,11 @@ export function posed(pose: ArrayLike<number>, p: Vec3): Vec3 {
   ) as unknown as Vec3;
 }
 
-/** `point`, or where a straight way to it from `centre` is `radius` long. */
-export function within(point: Vec3, centre: Vec3, radius: number): Vec3 {
-  const away = sub(point, centre);
-  return length(away) <= radius ? point : add(centre, scale(unit(away), radius));
+/** `from`, moved by at most `most` metres towards `to`. */
+export function approach(from: Vec3, to: Vec3, most: number): Vec3 {
+  const way = sub(to, from);
+  const distance = length(way);
+  return distance <= most ? to : add(from, scale(way, most / distance));
 }
 
 /**

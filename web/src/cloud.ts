@@ -205,8 +205,17 @@ function nearest(texture: THREE.DataTexture): THREE.DataTexture {
   return texture;
 }
 
-/** Of near, middling and far points, and of those that shape the proxy's normal. */
-export type CloudColours = Record<"near" | "middle" | "far" | "glow", THREE.Color>;
+/** Uniforms that all cameras share, set before a drawing. */
+export const cloudLook = () => ({
+  tinted: { value: true }, // with the cameras' own colours, where they have any
+  nearColour: { value: new THREE.Color() },
+  middleColour: { value: new THREE.Color() },
+  farColour: { value: new THREE.Color() },
+  glow: { value: new THREE.Color() }, // of what shapes the proxy's normal
+  proxy: { value: new THREE.Vector3() },
+  radii: { value: new THREE.Vector3(0.00499, 0.01, 0) },
+  light: { value: new THREE.Vector3(0, 0, 1) },
+});
 
 /** Draws a camera's newest frame. */
 export class CameraCloud {
@@ -225,19 +234,19 @@ export class CameraCloud {
   private spacing: Spacing = [0.002, 0]; // of points without an image
   private measuredSpacing = 0; // of so many points
 
-  constructor() {
+  constructor(look = cloudLook()) {
     this.material = new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
       vertexShader,
       fragmentShader,
       uniforms: {
+        ...look,
         depth: { value: null },
         points: { value: null },
         rays: { value: null },
         intrinsics: { value: new THREE.Vector4(1, 1, 0, 0) },
         metresPerUnit: { value: 1 },
         pointSpacing: { value: new THREE.Vector2() },
-        tinted: { value: true },
         tint: { value: null },
         tintSize: { value: new THREE.Vector2(1, 1) },
         tintLens: { value: new THREE.Vector4() },
@@ -248,13 +257,6 @@ export class CameraCloud {
         pixelsPerMetre: { value: 1 },
         smallest: { value: 1.5 },
         range: { value: new THREE.Vector2(0.5, 1.5) },
-        nearColour: { value: new THREE.Color() },
-        middleColour: { value: new THREE.Color() },
-        farColour: { value: new THREE.Color() },
-        glow: { value: new THREE.Color() },
-        proxy: { value: new THREE.Vector3(0, 0, 1e6) },
-        radii: { value: new THREE.Vector3(0.00499, 0.01, 0) },
-        light: { value: new THREE.Vector3(0, 0, 1) },
       },
     });
     this.object = new THREE.Points(new THREE.BufferGeometry(), this.material);
@@ -347,19 +349,9 @@ export class CameraCloud {
     this.object.geometry.setDrawRange(0, columns * rows);
   }
 
-  setProxy(at: Vec3, r1: number, r3: number): void {
-    this.material.uniforms.proxy!.value.fromArray(at);
-    this.material.uniforms.radii!.value.set(r1, r3, 0);
-  }
-
   /** Has it colours of its own? */
   get hasColour(): boolean {
     return this.frame?.colour != null;
-  }
-
-  /** Draws its own colours, where it has any, or those of depth. */
-  setTinted(tinted: boolean): void {
-    this.material.uniforms.tinted!.value = tinted;
   }
 
   /** [m] between what is measured about a place of the world. */
@@ -367,17 +359,6 @@ export class CameraCloud {
     const away = length(sub(place, this.seen?.eye ?? place));
     if (this.frame?.points) return this.spacing[0] + this.spacing[1] * away;
     return away / (this.frame?.intrinsics[0] ?? 1);
-  }
-
-  setLight(direction: Vec3): void {
-    this.material.uniforms.light!.value.fromArray(direction);
-  }
-
-  setColours(colours: CloudColours): void {
-    this.material.uniforms.nearColour!.value = colours.near;
-    this.material.uniforms.middleColour!.value = colours.middle;
-    this.material.uniforms.farColour!.value = colours.far;
-    this.material.uniforms.glow!.value = colours.glow;
   }
 
   // `prepare` says whether they are drawn.

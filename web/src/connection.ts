@@ -75,15 +75,14 @@ export class Connection {
 
   /** The Gaussians of the splat that is felt. */
   async splat(): Promise<ArrayBuffer> {
-    const token = this.token ? `?token=${encodeURIComponent(this.token)}` : "";
-    const answer = await fetch(`/splat${token}`, { cache: "no-store" });
+    const answer = await fetch(this.path("/splat"), { cache: "no-store" });
     if (!answer.ok) throw new Error(await answer.text());
     return answer.arrayBuffer();
   }
 
   private open(): void {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    const socket = new WebSocket(`${scheme}//${location.host}${this.path()}`);
+    const socket = new WebSocket(`${scheme}//${location.host}${this.path("/session")}`);
     this.socket = socket;
     this.opened = false;
     this.heard = performance.now() + SILENCE; // time to get through
@@ -110,8 +109,8 @@ export class Connection {
     this.handlers.hello(hello);
   }
 
-  private path(): string {
-    return "/session" + (this.token ? `?token=${encodeURIComponent(this.token)}` : "");
+  private path(of: string): string {
+    return of + (this.token ? `?token=${encodeURIComponent(this.token)}` : "");
   }
 
   private drop(socket: WebSocket): void {
@@ -126,7 +125,7 @@ export class Connection {
 
   // A browser does not tell why a WebSocket did not open; the program tells who asks without one.
   private async explainRefusal(): Promise<void> {
-    const status = await fetch(this.path(), { cache: "no-store" }).then(
+    const status = await fetch(this.path("/session"), { cache: "no-store" }).then(
       (answer) => answer.status,
       () => 0,
     );

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Virtual fixtures: where they are, as lines, and what the page adds and removes.
 
-import { clamp, posed } from "./camera_math";
+import { clamp, posed, scale } from "./camera_math";
 import { element, get } from "./dom";
 import type { Command, FixtureState, Role, State, Vec3 } from "./protocol";
 
@@ -24,24 +24,18 @@ function boxLines([x, y, z]: Vec3): Line[] {
 }
 
 // A circle of a radius across an axis, `along` it from the middle.
-function circle(radius: number, axis: 0 | 1 | 2, along = 0, from = 0, to = 2): Line[] {
+function circle(radius: number, axis: 0 | 1 | 2, along = 0): Line[] {
   const at = (i: number): Vec3 => {
-    const angle = Math.PI * (from + ((to - from) * i) / ROUND);
-    const place: [number, number, number] = [0, 0, 0];
-    place[axis] = along;
-    place[(axis + 1) % 3] = radius * Math.cos(angle);
-    place[(axis + 2) % 3] = radius * Math.sin(angle);
-    return place;
+    const angle = (2 * Math.PI * i) / ROUND;
+    const [x, y] = [radius * Math.cos(angle), radius * Math.sin(angle)];
+    return ([[along, x, y], [y, along, x], [x, y, along]] as const)[axis];
   };
   return Array.from({ length: ROUND }, (_, i) => [at(i), at(i + 1)] as const);
 }
 
 function sides(radius: number, length: number): Line[] {
-  return [0, 1, 2, 3].map((quarter) => {
-    const x = radius * Math.cos((quarter * Math.PI) / 2);
-    const y = radius * Math.sin((quarter * Math.PI) / 2);
-    return [[x, y, -length / 2] as Vec3, [x, y, length / 2] as Vec3] as const;
-  });
+  const quarters = circle(radius, 2).filter((_, i) => i % (ROUND / 4) === 0);
+  return quarters.map(([[x, y]]) => [[x, y, -length / 2], [x, y, length / 2]] as const);
 }
 
 function ownLines({ shape, size, radius, length, points }: FixtureState): Line[] {
@@ -57,13 +51,9 @@ function ownLines({ shape, size, radius, length, points }: FixtureState): Line[]
       const ends = [-length / 2, length / 2].flatMap((z) => circle(radius, 2, z));
       if (shape === "cylinder") return [...ends, ...sides(radius, length)];
       // Half circles over its ends, in two planes.
-      const domes = ([0, 1] as const).flatMap((axis) =>
-        circle(radius, axis).map(
-          ([a, b]) =>
-            [a, b].map(
-              ([x, y, z]) => [x, y, z + Math.sign(z || 1) * (length / 2)] as Vec3,
-            ) as unknown as Line,
-        ),
+      const lifted = ([x, y, z]: Vec3): Vec3 => [x, y, z + Math.sign(z || 1) * (length / 2)];
+      const domes = [...circle(radius, 0), ...circle(radius, 1)].map(
+        ([from, to]) => [lifted(from), lifted(to)] as const,
       );
       return [...ends, ...sides(radius, length), ...domes];
     }
@@ -73,11 +63,9 @@ function ownLines({ shape, size, radius, length, points }: FixtureState): Line[]
     case "path":
       return points.slice(1).map((point, i) => [points[i]!, point] as const);
     case "point":
-      return [0, 1, 2].map((axis) => {
-        const end: [number, number, number] = [0, 0, 0];
-        end[axis] = CROSS;
-        return [end.map((x) => -x) as unknown as Vec3, end] as const;
-      });
+      return ([[CROSS, 0, 0], [0, CROSS, 0], [0, 0, CROSS]] as const).map(
+        (end) => [scale(end, -1), end] as const,
+      );
   }
 }
 

@@ -3,7 +3,7 @@
 
 import { Quaternion, Vector3 } from "three";
 import {
-  add, axes, depthOf, dragged, length, metresPerPixel, scale, turned, unit, within, zoomed,
+  add, approach, axes, depthOf, dragged, length, metresPerPixel, scale, turned, unit, zoomed,
 } from "./camera_math";
 import type { Stick } from "./gamepad";
 import { Pointers, type Place } from "./pointers";
@@ -157,7 +157,7 @@ export class HandInput {
     if (!this.held) return;
     this.target = dragged(this.view.orbit, this.target, pixels, into, this.view.height);
     const felt = this.host.newest();
-    if (felt?.touching) this.target = within(this.target, felt.proxy, DEEPEST);
+    if (felt?.touching) this.target = approach(felt.proxy, this.target, DEEPEST);
     this.moved(Grip.held, this.target);
   }
 
@@ -333,7 +333,7 @@ export class HandInput {
     const { from, along } = this.view.rayUnder(at.x, at.y);
     const place = onPlane(from, along, press.aimedAt);
     if (!place) return;
-    press.aim({ ...press.aimedAt, at: within(place, press.aimedAt.at, FARTHEST_SLIDE) });
+    press.aim({ ...press.aimedAt, at: approach(press.aimedAt.at, place, FARTHEST_SLIDE) });
   }
 
   private keyStep(seconds: number): void {

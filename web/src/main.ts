@@ -9,14 +9,13 @@ import { fixtureLines, Fixtures } from "./fixtures";
 import { stickOf } from "./gamepad";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
-import { handsLines, handsText } from "./more_hands";
+import { handsLines, handsText, robotLines, robotText } from "./others";
 import { cameraText, latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
 import { radiusRemark, scaleQuestion } from "./proposal";
 import {
   encodeHand, encodeShown, type Command, type Frame, type Hello, type State, type Ticks,
 } from "./protocol";
-import { robotLines, robotText } from "./robot";
 import { Ruler } from "./ruler";
 import { COLOURS, GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
@@ -331,16 +330,6 @@ function loop(now: number): void {
   requestAnimationFrame(loop);
 }
 
-// Buttons and their keys.
-let following = false;
-function follow(): void {
-  following = !following;
-  view.setFollowing(following);
-  get("follow").setAttribute("aria-pressed", String(following));
-}
-function switchColour(): void {
-  view.setTinted(!view.tinted);
-}
 function record(): void {
   if (state && mayOperate(state))
     ask({ record: state.recording.path === null });
@@ -368,44 +357,44 @@ function switchTheme(): void {
 systemTheme.addEventListener("change", () => applyTheme(chosenTheme()));
 applyTheme(chosenTheme());
 
-// Off at first: a page makes no noise by itself.
-for (const [id, set] of [
-  ["sound", (on: boolean) => senses.setSound(on)],
-  ["vibration", (on: boolean) => senses.setVibration(on)],
-] as const) {
-  const button = get(id);
-  button.addEventListener("click", () => {
-    const on = button.getAttribute("aria-pressed") !== "true";
-    set(on);
-    button.setAttribute("aria-pressed", String(on));
-  });
-}
-get("follow").addEventListener("click", follow);
-get("spin").addEventListener("click", () => {
-  hand.spinByDrags = !hand.spinByDrags;
-  get("spin").setAttribute("aria-pressed", String(hand.spinByDrags));
-});
-get("record").addEventListener("click", record);
-get("reset-faults").addEventListener("click", () => ask({ reset_faults: true }));
-get("proposal-yes").addEventListener("click", () => {
-  if (state?.points) ask({ open: state.points.rescaled });
-});
-get("proposal-no").addEventListener("click", () => {
-  declined = state?.points?.rescaled ?? "";
-  get("proposal").hidden = true;
-});
-get("felt").addEventListener("click", switchFelt);
-get("colour").addEventListener("click", switchColour);
-get("more-plots").addEventListener("click", () => {
-  const all = get("more-plots").getAttribute("aria-expanded") !== "true";
-  get("more-plots").setAttribute("aria-expanded", String(all));
-  write("more-plots", all ? "Fewer figures" : "More figures");
-  plots.show(all);
-});
-get("reset").addEventListener("click", () => view.resetView());
-get("share").addEventListener("click", share);
-get("theme").addEventListener("click", switchTheme);
-get("ask").addEventListener("click", help);
+// A button that is on or off.
+const toggled = (id: string, set: (on: boolean) => void) => (): void => {
+  const on = get(id).getAttribute("aria-pressed") !== "true";
+  set(on);
+  get(id).setAttribute("aria-pressed", String(on));
+};
+const buttons: Record<string, () => void> = {
+  follow: toggled("follow", (on) => view.setFollowing(on)),
+  spin: toggled("spin", (on) => (hand.spinByDrags = on)),
+  // Off at first: a page makes no noise by itself.
+  sound: toggled("sound", (on) => senses.setSound(on)),
+  vibration: toggled("vibration", (on) => senses.setVibration(on)),
+  "reset-faults": () => ask({ reset_faults: true }),
+  "proposal-yes": () => state?.points && ask({ open: state.points.rescaled }),
+  "proposal-no": () => {
+    declined = state?.points?.rescaled ?? "";
+    get("proposal").hidden = true;
+  },
+  "more-plots": () => {
+    const all = get("more-plots").getAttribute("aria-expanded") !== "true";
+    get("more-plots").setAttribute("aria-expanded", String(all));
+    write("more-plots", all ? "Fewer figures" : "More figures");
+    plots.show(all);
+  },
+  felt: switchFelt,
+  colour: () => view.switchTint(),
+  reset: () => view.resetView(),
+  play: () => timeline.pause(),
+  theme: switchTheme,
+  ask: help,
+  record,
+  share,
+};
+for (const [id, act] of Object.entries(buttons)) get(id).addEventListener("click", act);
+const KEYS: Record<string, string> = {
+  ...{ KeyF: "follow", KeyC: "colour", KeyS: "felt", KeyV: "reset" },
+  ...{ KeyR: "record", KeyT: "theme", KeyK: "play" },
+};
 for (const [id, share] of [["push", 0.006], ["pull", -0.006]] as const) {
   let timer = 0;
   const button = get(id);
@@ -419,13 +408,7 @@ for (const [id, share] of [["push", 0.006], ["pull", -0.006]] as const) {
 addEventListener("keydown", (event) => {
   if (isForForm(event) || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "?") help();
-  if (event.code === "KeyF") follow();
-  if (event.code === "KeyC") switchColour();
-  if (event.code === "KeyS") switchFelt();
-  if (event.code === "KeyV") view.resetView();
-  if (event.code === "KeyR") record();
-  if (event.code === "KeyT") switchTheme();
-  if (event.code === "KeyK") timeline.pause();
+  buttons[KEYS[event.code] ?? ""]?.();
 });
 
 requestAnimationFrame(loop);

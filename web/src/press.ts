@@ -2,7 +2,7 @@
 // The way of a hand that presses where somebody points: over to the spot, down to it, into it until
 // it pushes with some force, and along the surface when the spot moves. Never a jump.
 
-import { add, clamp, dot, length, scale, sub, unit } from "./camera_math";
+import { add, approach, clamp, dot, length, scale, sub, unit } from "./camera_math";
 import type { Vec3 } from "./protocol";
 import type { Spot } from "./surface";
 
@@ -47,13 +47,6 @@ export interface Felt {
  * unit vector to the camera; null where nothing is seen.
  */
 export type Ahead = (place: Vec3) => { distance: number; towards: Vec3 } | null;
-
-/** `from`, moved by at most `most` metres towards `to`. */
-export function approach(from: Vec3, to: Vec3, most: number): Vec3 {
-  const way = sub(to, from);
-  const distance = length(way);
-  return distance <= most ? to : add(from, scale(way, most / distance));
-}
 
 /** Where a hand hovers over a spot. */
 export function above(spot: Spot, hover = HOVER): Vec3 {

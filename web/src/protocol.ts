@@ -9,15 +9,8 @@ const Kind = { frame: 1, ticks: 2, rays: 3, path: 4, tool: 5, hand: 16, shown: 1
 const Format = { depth: 0, depthWithRays: 1, points: 2 } as const;
 const Colours = { none: 0, registered: 1, ownCamera: 2 } as const;
 
-const FRAME_HEADER = 96;
-const COLOUR_HEADER = 72;
-const TICKS_HEADER = 160;
-const CONTACT_BYTES = 24;
 // The numbers of a sample, in the order of the message; `t` as the time before the newest tick.
 const SAMPLE = ["t", "force", "penetration", "steps", "tickTime", "relative", "absolute"] as const;
-const RAYS_HEADER = 12;
-const PATH_HEADER = 8;
-const TOOL_HEADER = 12;
 const HAND_BYTES = 32;
 const TURNED_HAND_BYTES = 64;
 const SHOWN_BYTES = 8;
@@ -121,161 +114,152 @@ export interface Tool {
 
 export type Message = Frame | Ticks | Rays | HandPath | Tool;
 
-function vec3(view: DataView, at: number): Vec3 {
-  return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
-}
-
-function quat(view: DataView, at: number): Quat {
-  return [...vec3(view, at), view.getFloat32(at + 12, true)];
-}
-
 function need(condition: boolean, what: string): asserts condition {
   if (!condition) throw new Error(`message: ${what}`);
 }
 
-function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
-  need(buffer.byteLength >= FRAME_HEADER, "a frame without its header");
-  const format = view.getUint8(2);
-  const width = view.getUint32(16, true);
-  const height = view.getUint32(20, true);
-  const count = width * height;
-  const isPoints = format === Format.points;
-  need(format <= Format.points, `frame format ${format}`);
-  const colours = view.getUint8(3);
-  need(colours <= Colours.ownCamera, `colours ${colours}`);
-  const ownCamera = colours === Colours.ownCamera;
-  const header = FRAME_HEADER + (ownCamera ? COLOUR_HEADER : 0);
-  need(buffer.byteLength >= header, "a frame without its header");
-  const triangles = isPoints ? view.getUint32(92, true) : 0;
-  const measured = header + count * (isPoints ? 12 : 2) + 12 * triangles; // [bytes]
-  const size = ownCamera
-    ? ([view.getUint32(96, true), view.getUint32(100, true)] as const)
-    : ([width, height] as const);
-  const colourBytes = colours === Colours.none ? 0 : 3 * size[0] * size[1];
-  need(buffer.byteLength === measured + colourBytes, "a frame cut short");
-  const lens = (at: number) =>
-    [0, 4, 8, 12].map((i) => view.getFloat32(at + i, true)) as unknown as Frame["intrinsics"];
-  return {
-    kind: "frame",
-    camera: view.getUint8(1),
-    number: view.getUint32(4, true),
-    stamp: view.getFloat64(8, true),
-    width,
-    height,
-    intrinsics: lens(24),
-    metresPerUnit: view.getFloat32(40, true),
-    worldFromCamera: new Float32Array(buffer.slice(44, 92)),
-    hasRays: format === Format.depthWithRays,
-    depth: isPoints ? null : new Uint16Array(buffer, header, count),
-    points: isPoints ? new Float32Array(buffer, header, 3 * count) : null,
-    triangles: triangles > 0 ? new Uint32Array(buffer, header + 12 * count, 3 * triangles) : null,
-    colour:
-      colourBytes === 0
-        ? null
-        : {
-            width: size[0],
-            height: size[1],
-            rgb: new Uint8Array(buffer, measured, colourBytes),
-            camera: ownCamera
-              ? {
-                  intrinsics: lens(104),
-                  cameraFromWorld: new Float32Array(buffer.slice(120, 168)),
-                }
-              : null,
-          },
-  };
-}
+/** Takes the numbers of a message one after the other, and arrays as they lie there. */
+class Reader {
+  private at = 0;
+  private readonly view: DataView;
 
-function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
-  need(buffer.byteLength >= TICKS_HEADER, "ticks without their header");
-  const count = view.getUint16(2, true);
-  const behind = TICKS_HEADER + CONTACT_BYTES * view.getUint32(156, true);
-  need(buffer.byteLength === behind + count * 4 * SAMPLE.length, "ticks cut short");
-  const t = view.getFloat64(8, true);
-  const contacts: Contact[] = [];
-  for (let at = TICKS_HEADER; at < behind; at += CONTACT_BYTES)
-    contacts.push({ at: vec3(view, at), push: vec3(view, at + 12) });
-  const values = new Float32Array(buffer, behind);
-  const samples: Sample[] = [];
-  for (let i = 0; i < values.length; i += SAMPLE.length) {
-    const row = SAMPLE.map((name, k) => [name, values[i + k]!] as const);
-    const sample = Object.fromEntries(row) as unknown as Sample;
-    samples.push({ ...sample, t: t - sample.t });
+  constructor(private readonly buffer: ArrayBuffer) {
+    this.view = new DataView(buffer);
   }
+
+  get left(): number {
+    return this.buffer.byteLength - this.at;
+  }
+
+  skip(bytes: number): number {
+    need(bytes <= this.left, "cut short");
+    this.at += bytes;
+    return this.at - bytes;
+  }
+
+  u8 = () => this.view.getUint8(this.skip(1));
+  u16 = () => this.view.getUint16(this.skip(2), true);
+  u32 = () => this.view.getUint32(this.skip(4), true);
+  i32 = () => this.view.getInt32(this.skip(4), true);
+  f32 = () => this.view.getFloat32(this.skip(4), true);
+  f64 = () => this.view.getFloat64(this.skip(8), true);
+  vec3 = (): Vec3 => [this.f32(), this.f32(), this.f32()];
+  vec4 = (): Quat => [...this.vec3(), this.f32()];
+  bytes = (count: number) => new Uint8Array(this.buffer, this.skip(count), count);
+  shorts = (count: number) => new Uint16Array(this.buffer, this.skip(2 * count), count);
+  words = (count: number) => new Uint32Array(this.buffer, this.skip(4 * count), count);
+  floats = (count: number) => new Float32Array(this.buffer, this.skip(4 * count), count);
+}
+
+function decodeFrame(take: Reader): Frame {
+  const [camera, format, colours] = [take.u8(), take.u8(), take.u8()];
+  need(format <= Format.points, `frame format ${format}`);
+  need(colours <= Colours.ownCamera, `colours ${colours}`);
+  const isPoints = format === Format.points;
+  const frame = {
+    kind: "frame" as const,
+    camera,
+    number: take.u32(),
+    stamp: take.f64(),
+    width: take.u32(),
+    height: take.u32(),
+    intrinsics: take.vec4(),
+    metresPerUnit: take.f32(),
+    worldFromCamera: take.floats(12),
+    hasRays: format === Format.depthWithRays,
+  };
+  const faces = take.u32();
+  const seen =
+    colours === Colours.ownCamera
+      ? {
+          width: take.u32(),
+          height: take.u32(),
+          camera: { intrinsics: take.vec4(), cameraFromWorld: take.floats(12) },
+        }
+      : { width: frame.width, height: frame.height, camera: null };
+  const count = frame.width * frame.height;
+  const pixels = colours === Colours.none ? 0 : seen.width * seen.height;
   return {
-    kind: "ticks",
-    state: view.getUint8(1),
-    flags: view.getUint32(4, true),
-    t,
-    safety: view.getUint32(16, true),
-    steps: view.getUint32(20, true),
-    hip: vec3(view, 24),
-    proxy: vec3(view, 36),
-    normal: vec3(view, 48),
-    force: vec3(view, 60),
-    surfaceVelocity: view.getFloat32(72, true),
-    gain: view.getFloat32(80, true),
-    askedForce: view.getFloat32(84, true),
-    place: vec3(view, 88),
-    region: view.getFloat32(100, true),
-    guidance: view.getFloat32(104, true),
-    fixtures: view.getUint32(108, true),
-    frame: view.getInt32(76, true),
-    orientation: quat(view, 112),
-    proxyOrientation: quat(view, 128),
-    torque: vec3(view, 144),
-    contacts,
-    samples,
+    ...frame,
+    depth: isPoints ? null : take.shorts(count),
+    points: isPoints ? take.floats(3 * count) : null,
+    triangles: isPoints && faces > 0 ? take.words(3 * faces) : null,
+    colour: pixels > 0 ? { ...seen, rgb: take.bytes(3 * pixels) } : null,
   };
 }
 
-function decodeRays(buffer: ArrayBuffer, view: DataView): Rays {
-  need(buffer.byteLength >= RAYS_HEADER, "rays without their header");
-  const width = view.getUint32(4, true);
-  const height = view.getUint32(8, true);
-  need(buffer.byteLength === RAYS_HEADER + 8 * width * height, "rays cut short");
-  const rays = new Float32Array(buffer, RAYS_HEADER);
-  return { kind: "rays", camera: view.getUint8(1), width, height, rays };
-}
-
-function decodePath(buffer: ArrayBuffer, view: DataView): HandPath {
-  need(buffer.byteLength >= PATH_HEADER, "a path without its header");
-  const count = view.getUint32(4, true);
-  need(buffer.byteLength === PATH_HEADER + 16 * count, "a path cut short");
-  return { kind: "path", camera: view.getUint8(1), places: new Float32Array(buffer, PATH_HEADER) };
-}
-
-function decodeTool(buffer: ArrayBuffer, view: DataView): Tool {
-  need(buffer.byteLength >= TOOL_HEADER, "a tool without its header");
-  const [points, triangles] = [view.getUint32(4, true), view.getUint32(8, true)];
-  const behind = TOOL_HEADER + 12 * points;
-  need(buffer.byteLength === behind + 12 * triangles, "a tool cut short");
-  return {
-    kind: "tool",
-    points: new Float32Array(buffer, TOOL_HEADER, 3 * points),
-    triangles: new Uint32Array(buffer, behind),
+function decodeTicks(take: Reader): Ticks {
+  const [state, count] = [take.u8(), take.u16()];
+  const newest = {
+    kind: "ticks" as const,
+    state,
+    flags: take.u32(),
+    t: take.f64(),
+    safety: take.u32(),
+    steps: take.u32(),
+    hip: take.vec3(),
+    proxy: take.vec3(),
+    normal: take.vec3(),
+    force: take.vec3(),
+    surfaceVelocity: take.f32(),
+    frame: take.i32(),
+    gain: take.f32(),
+    askedForce: take.f32(),
+    place: take.vec3(),
+    region: take.f32(),
+    guidance: take.f32(),
+    fixtures: take.u32(),
+    orientation: take.vec4(),
+    proxyOrientation: take.vec4(),
+    torque: take.vec3(),
   };
+  const contact = (): Contact => ({ at: take.vec3(), push: take.vec3() });
+  const contacts = Array.from({ length: take.u32() }, contact);
+  const samples = Array.from({ length: count }, () => {
+    const row = SAMPLE.map((name) => [name, take.f32()] as const);
+    const sample = Object.fromEntries(row) as unknown as Sample;
+    return { ...sample, t: newest.t - sample.t };
+  });
+  return { ...newest, contacts, samples };
 }
+
+function decodeRays(take: Reader): Rays {
+  const camera = take.u8();
+  take.skip(2);
+  const [width, height] = [take.u32(), take.u32()];
+  return { kind: "rays", camera, width, height, rays: take.floats(2 * width * height) };
+}
+
+function decodePath(take: Reader): HandPath {
+  const camera = take.u8();
+  take.skip(2);
+  return { kind: "path", camera, places: take.floats(4 * take.u32()) };
+}
+
+function decodeTool(take: Reader): Tool {
+  take.skip(3);
+  const [points, triangles] = [take.u32(), take.u32()];
+  return { kind: "tool", points: take.floats(3 * points), triangles: take.words(3 * triangles) };
+}
+
+const DECODERS: Record<number, (take: Reader) => Message> = {
+  [Kind.frame]: decodeFrame,
+  [Kind.ticks]: decodeTicks,
+  [Kind.rays]: decodeRays,
+  [Kind.path]: decodePath,
+  [Kind.tool]: decodeTool,
+};
 
 /** Takes a binary message apart without copying its payload. Throws if it is malformed. */
 export function decode(buffer: ArrayBuffer): Message {
   need(buffer.byteLength > 0, "empty");
-  const view = new DataView(buffer);
-  const kind = view.getUint8(0);
-  switch (kind) {
-    case Kind.frame:
-      return decodeFrame(buffer, view);
-    case Kind.ticks:
-      return decodeTicks(buffer, view);
-    case Kind.rays:
-      return decodeRays(buffer, view);
-    case Kind.path:
-      return decodePath(buffer, view);
-    case Kind.tool:
-      return decodeTool(buffer, view);
-    default:
-      throw new Error(`message: kind ${kind} is not known`);
-  }
+  const take = new Reader(buffer);
+  const kind = take.u8();
+  const decodeRest = DECODERS[kind];
+  need(decodeRest !== undefined, `kind ${kind} is not known`);
+  const message = decodeRest(take);
+  need(take.left === 0, "cut short");
+  return message;
 }
 
 /** What the page does with the hand: 2 lets go, and it goes to the place without a force. */

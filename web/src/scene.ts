@@ -4,7 +4,7 @@
 // spot under the pointer, the cameras, and a grid below all that is seen.
 
 import * as THREE from "three";
-import { CameraCloud } from "./cloud";
+import { CameraCloud, cloudLook } from "./cloud";
 import {
   add, axes, clamp, depthOf, dot, eye, FIELD_OF_VIEW, length, lookAt, metresPerPixel, rayThrough,
   scale, sub, unit, type Orbit,
@@ -90,6 +90,7 @@ const BALL = new THREE.SphereGeometry(1, 48, 32);
 const HIDDEN_TOO = { depthTest: false, transparent: true } as const;
 const FLAT = { ...HIDDEN_TOO, side: THREE.DoubleSide } as const;
 
+const FAR_AWAY: Vec3 = [0, 0, 1e6]; // a proxy that is not known: nothing glows
 const NO_CONTACT: Contact = { at: [0, 0, 0], push: [0, 0, 0] };
 const NO_TOOL: Tool = { kind: "tool", points: new Float32Array(), triangles: new Uint32Array() };
 
@@ -145,6 +146,7 @@ export class SceneView {
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW * THREE.MathUtils.RAD2DEG);
+  private readonly look = cloudLook();
   private readonly clouds = new Map<number, CameraCloud>();
   private readonly felt = new THREE.Group(); // all that is drawn of them
   private splat: SplatCloud | null = null;
@@ -229,7 +231,6 @@ export class SceneView {
   private stale = true;
   private lastDrawing = 0; // [ms] 0: measured
   private drawnAt = -Infinity; // [ms]
-  tinted = true; // the cameras' own colours are wanted, where they have any
 
   /** Throws if the browser has no WebGL 2. */
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -301,7 +302,10 @@ export class SceneView {
       for (const material of materials) material.color.set(palette[name as keyof Palette]);
     this.arrowMaterial.emissive.set(palette.force).multiplyScalar(0.35);
     if (this.software) this.renderer.setClearColor(palette.ground, 1);
-    for (const cloud of this.clouds.values()) cloud.setColours(this.cloudColours());
+    this.look.nearColour.value.set(palette.near);
+    this.look.middleColour.value.set(palette.middle);
+    this.look.farColour.value.set(palette.far);
+    this.look.glow.value.set(palette.force);
     this.touch();
   }
 
@@ -529,7 +533,7 @@ export class SceneView {
 
   /** Are they drawn? */
   get showsColour(): boolean {
-    return this.tinted && this.hasColour;
+    return this.look.tinted.value && this.hasColour;
   }
 
   /** Is the world the camera's own frame, as no pose is known? */
@@ -539,9 +543,8 @@ export class SceneView {
   }
 
   /** Draws the cameras' own colours, where they have any, or those of depth. */
-  setTinted(tinted: boolean): void {
-    this.tinted = tinted;
-    for (const cloud of this.clouds.values()) cloud.setTinted(tinted);
+  switchTint(): void {
+    this.look.tinted.value = !this.look.tinted.value;
     this.touch();
   }
 
@@ -686,11 +689,12 @@ export class SceneView {
     this.setResolution();
     const pixelsPerMetre = this.canvas.height / (2 * Math.tan(FIELD_OF_VIEW / 2));
     this.drawnPoints = 0;
+    const { r_1, r_3 } = this.reach > 0 ? { r_1: 0, r_3: 0 } : this.radii;
+    this.look.radii.value.set(r_1, r_3, 0);
+    this.look.proxy.value.set(...(this.tick?.proxy ?? FAR_AWAY));
+    this.look.light.value.set(...lampAt);
     for (const cloud of this.clouds.values()) {
       cloud.prepare(this.thinning.stride, pixelsPerMetre, this.renderer.getPixelRatio());
-      cloud.setLight(lampAt);
-      const { r_1, r_3 } = this.reach > 0 ? { r_1: 0, r_3: 0 } : this.radii;
-      if (this.tick) cloud.setProxy(this.tick.proxy, r_1, r_3);
       if (cloud.object.visible && this.felt.visible)
         this.drawnPoints += cloud.object.geometry.drawRange.count;
     }
@@ -708,19 +712,11 @@ export class SceneView {
   private cloudOf(camera: number): CameraCloud {
     let cloud = this.clouds.get(camera);
     if (!cloud) {
-      cloud = new CameraCloud();
-      cloud.setColours(this.cloudColours());
-      cloud.setTinted(this.tinted);
+      cloud = new CameraCloud(this.look);
       this.clouds.set(camera, cloud);
       this.felt.add(cloud.object, cloud.faces);
     }
     return cloud;
-  }
-
-  private cloudColours() {
-    const { near, middle, far, force } = this.palette;
-    const [n, m, f, g] = [near, middle, far, force].map((c) => new THREE.Color(c));
-    return { near: n!, middle: m!, far: f!, glow: g! };
   }
 
   private resize(): void {
@@ -743,12 +739,6 @@ export class SceneView {
     const away = sub(at, this.orbit.target);
     if (length(away) < 2e-4) return;
     this.setOrbit({ ...this.orbit, target: add(this.orbit.target, scale(away, 0.12)) });
-  }
-
-  // The surface that the hand is over, and how high it is above it [m].
-  private underHand(): { spot: Spot; height: number } | null {
-    const spot = this.tick && this.spotAt(this.tick.proxy);
-    return spot && { spot, height: dot(sub(this.tick!.proxy, spot.at), spot.normal) };
   }
 
   // Once: from what is seen at first. A moving camera's frustum moves with it.
@@ -806,7 +796,9 @@ export class SceneView {
     if (this.turning.visible) this.lay(this.turning, about, turnRadius);
 
     // The shadow on what the hand is over, and the line down to it.
-    const under = (this.under = this.underHand());
+    const spot = this.spotAt(tick.proxy);
+    const under = spot && { spot, height: dot(sub(tick.proxy, spot.at), spot.normal) };
+    this.under = under;
     const near = under !== null && Math.abs(under.height) < 0.5;
     this.shadow.visible = near && under.height > 0.5 * r_c;
     this.plumb.visible = false;

@@ -120,7 +120,8 @@ export class SeenSurface {
     const face = this.frame.triangles && this.meetFaces(start, direction);
     if (face) {
       const at = add(from, scale(along, face.distance));
-      return { spot: { at, normal: this.turnedToWorld(face.normal) }, distance: face.distance };
+      const normal = sub(this.toWorld(face.normal), this.eye);
+      return { spot: { at, normal }, distance: face.distance };
     }
     const distance = this.frame.points
       ? this.meetPoints(start, direction)
@@ -342,10 +343,6 @@ export class SeenSurface {
 
   private toWorld(p: Vec3): Vec3 {
     return posed(this.pose, p);
-  }
-
-  private turnedToWorld(v: Vec3): Vec3 {
-    return sub(posed(this.pose, v), this.eye);
   }
 
   private toCamera(p: Vec3): Vec3 {

@@ -28,7 +28,8 @@ const REST_LEVEL = { card: 0, software: 1 };
 export class Thinning {
   /** Nothing moves: the view is drawn once as finely as it can be. */
   resting = false;
-  private average: number | null = null;
+  /** [s] between drawn frames, smoothed; null before the first. */
+  frameTime: number | null = null;
   private fastFrames = 0;
   private patience = PATIENCE;
   private readonly rest: number;
@@ -56,24 +57,20 @@ export class Thinning {
     return LEVELS[this.resting ? Math.min(this.rest, this.level) : this.level]!;
   }
 
-  /** [s] between drawn frames, smoothed; null before the first. */
-  get frameTime(): number | null {
-    return this.average;
-  }
-
   /** @param seconds that the last frame took, from one drawing to the next */
   measure(seconds: number): void {
     if (!(seconds > 0) || seconds > 2) return; // a sleeping tab
-    this.average = this.average === null ? seconds : this.average + 0.3 * (seconds - this.average);
-    if (this.average > SLOW && this.level < LEVELS.length - 1) {
+    this.frameTime ??= seconds;
+    this.frameTime += 0.3 * (seconds - this.frameTime);
+    if (this.frameTime > SLOW && this.level < LEVELS.length - 1) {
       ++this.level;
-      this.average = null;
+      this.frameTime = null;
       this.fastFrames = 0;
       this.patience = Math.min(this.patience * 2, 60 * 60);
-    } else if (this.average < FAST && this.level > 0) {
+    } else if (this.frameTime < FAST && this.level > 0) {
       if (++this.fastFrames < this.patience) return;
       --this.level;
-      this.average = null;
+      this.frameTime = null;
       this.fastFrames = 0;
     } else {
       this.fastFrames = 0;

@@ -68,7 +68,6 @@ export class Timeline {
 
   constructor(private readonly ask: (command: Command) => void) {
     for (const speed of SPEEDS) this.speed.append(new Option(`${speed}×`, String(speed)));
-    get("play").addEventListener("click", () => this.pause());
     get("loop").addEventListener("click", () => this.set({ loop: !this.playback.loop }));
     this.speed.addEventListener("change", () => this.set({ speed: +this.speed.value }));
     this.place.addEventListener("input", () => this.seek(+this.place.value / +this.place.max));

@@ -3,33 +3,7 @@
 
 const INTERVAL = 30; // [ms] between frames, at least
 
-// Of WebXR's types those that are used: TypeScript's own list of the browser's does not have them.
-interface XrView {
-  projectionMatrix: Float32Array;
-  transform: { matrix: Float32Array };
-}
-interface XrDepth {
-  width: number;
-  height: number;
-  data: ArrayBuffer;
-  rawValueToMeters: number;
-  normDepthBufferFromNormView: { matrix: Float32Array };
-}
-interface XrFrame {
-  getViewerPose(space: unknown): { views: XrView[] } | null;
-  getDepthInformation(view: XrView): XrDepth | null | undefined;
-}
-interface XrSession extends EventTarget {
-  depthDataFormat: string;
-  updateRenderState(state: object): void;
-  requestReferenceSpace(kind: string): Promise<unknown>;
-  requestAnimationFrame(draw: (time: number, frame: XrFrame) => void): void;
-  end(): Promise<void>;
-}
-interface Xr {
-  isSessionSupported(mode: string): Promise<boolean>;
-  requestSession(mode: string, options: object): Promise<XrSession>;
-}
+type Pose = Pick<XRRigidTransform, "matrix">;
 
 /** A depth image in millimetres, and where it was taken. */
 export interface DepthFrame {
@@ -46,8 +20,8 @@ export interface DepthFrame {
  * lie askew or mirrored.
  */
 export function pinholeOf(
-  view: XrView,
-  depth: Omit<XrDepth, "data" | "rawValueToMeters">,
+  view: Pick<XRView, "projectionMatrix"> & { transform: Pose },
+  depth: Pick<XRDepthInformation, "width" | "height"> & { normDepthBufferFromNormView: Pose },
 ): Pick<DepthFrame, "camera" | "pose"> | null {
   const p = view.projectionMatrix;
   const n = depth.normDepthBufferFromNormView.matrix;
@@ -80,17 +54,15 @@ export function pinholeOf(
   };
 }
 
-function millimetres(depth: XrDepth, format: string): Uint16Array {
+function millimetres(depth: XRCPUDepthInformation, format?: XRDepthDataFormat): Uint16Array {
   const raw = format === "float32" ? new Float32Array(depth.data) : new Uint16Array(depth.data);
   const factor = 1000 * depth.rawValueToMeters;
   return Uint16Array.from(raw, (value) => Math.min(Math.max(Math.round(value * factor), 0), 65535));
 }
 
-const xr = () => (navigator as { xr?: Xr }).xr;
-
 /** Can this browser show what is before it, with its depth? */
 export const hasDepth = async (): Promise<boolean> =>
-  (await xr()?.isSessionSupported("immersive-ar").catch(() => false)) ?? false;
+  (await navigator.xr?.isSessionSupported("immersive-ar").catch(() => false)) ?? false;
 
 /**
  * Gives frames until the session ends. The page stays over the camera's picture.
@@ -100,7 +72,7 @@ export async function watchDepth(
   take: (frame: DepthFrame) => void,
   ended: () => void,
 ): Promise<() => void> {
-  const session = await xr()!.requestSession("immersive-ar", {
+  const session = await navigator.xr!.requestSession("immersive-ar", {
     requiredFeatures: ["depth-sensing"],
     optionalFeatures: ["dom-overlay"],
     domOverlay: { root: document.body },
@@ -110,13 +82,11 @@ export async function watchDepth(
     },
   });
   session.addEventListener("end", ended);
-  const gl = document.createElement("canvas").getContext("webgl", { xrCompatible: true });
-  const Layer = (globalThis as unknown as { XRWebGLLayer: new (...of: unknown[]) => object })
-    .XRWebGLLayer;
-  session.updateRenderState({ baseLayer: new Layer(session, gl) });
+  const gl = document.createElement("canvas").getContext("webgl", { xrCompatible: true })!;
+  void session.updateRenderState({ baseLayer: new XRWebGLLayer(session, gl) });
   const space = await session.requestReferenceSpace("local");
   let last = -INTERVAL;
-  const draw = (time: number, frame: XrFrame) => {
+  const draw = (time: number, frame: XRFrame) => {
     session.requestAnimationFrame(draw);
     const view = frame.getViewerPose(space)?.views[0];
     const depth = view && frame.getDepthInformation(view);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { describe, expect, test } from "vitest";
 import {
+  approach,
   axes,
   cross,
   depthOf,
@@ -14,7 +15,6 @@ import {
   sub,
   turned,
   upFromPose,
-  within,
   zoomed,
   type Orbit,
 } from "../src/camera_math";
@@ -78,6 +78,6 @@ test("up is -y for a camera's own frame and z for a world", () => {
 });
 
 test("a hand is kept within reach of what it touches", () => {
-  expect(within([0, 0, 0.03], [0, 0, 0], 0.05)).toEqual([0, 0, 0.03]);
-  near(within([0, 0.3, 0], [0, 0.1, 0], 0.05), [0, 0.15, 0]);
+  expect(approach([0, 0, 0], [0, 0, 0.03], 0.05)).toEqual([0, 0, 0.03]);
+  near(approach([0, 0.1, 0], [0, 0.3, 0], 0.05), [0, 0.15, 0]);
 });

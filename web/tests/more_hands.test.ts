@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, it } from "vitest";
 
-import { handsLines, handsText } from "../src/more_hands";
+import { handsLines, handsText } from "../src/others";
 import type { OtherHand } from "../src/protocol";
 
 const left: OtherHand = {

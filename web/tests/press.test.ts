@@ -3,10 +3,9 @@
 // ticks that are known late.
 
 import { describe, expect, test } from "vitest";
-import { add, dot, length, scale, sub } from "../src/camera_math";
+import { add, approach, dot, length, scale, sub } from "../src/camera_math";
 import {
   above,
-  approach,
   flight,
   HOVER,
   LONGEST_CHASE,

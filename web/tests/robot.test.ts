@@ -2,7 +2,7 @@
 import { expect, it } from "vitest";
 
 import type { RobotState } from "../src/protocol";
-import { robotLines, robotText } from "../src/robot";
+import { robotLines, robotText } from "../src/others";
 
 const led: RobotState = {
   name: "robot",

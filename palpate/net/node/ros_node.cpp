@@ -19,6 +19,7 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/net/node/node_parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -47,10 +48,8 @@ struct TickReport {
   }
 };
 
-// How a session was over some time.
 struct SessionReport {
   SessionState state;
-  TickReport ticks;
   double tick_rate = 0.0;        // [Hz] measured
   std::uint64_t late_ticks = 0;  // in that time
   double now = 0.0;              // [s] on the servo loop's clock
@@ -58,7 +57,7 @@ struct SessionReport {
     TickReport ticks;
     DeviceInfo device;
   };
-  std::vector<Hand> more_hands = {};  // SessionState::hands but the first
+  std::vector<Hand> hands = {};  // as SessionState::hands
 };
 
 using ros::DiagnosticStatus;
@@ -109,9 +108,9 @@ Marker arrow(const ros::Header& header, const std::string& name, const Vec3& fro
   return made;
 }
 
-std::string number(double value, const char* format = "%.4g") {
+std::string number(double value) {
   std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), format, value);
+  std::snprintf(text.data(), text.size(), "%.4g", value);
   return text.data();
 }
 
@@ -126,9 +125,7 @@ std::string names_of(std::uint32_t bits, const Names& names) {
 }
 
 std::string tick_flags(std::uint32_t bits) {
-  std::vector<std::string_view> names;
-  for (const TickFlagInfo& flag : tick_flag_table()) names.push_back(flag.name);
-  return names_of(bits, names);
+  return names_of(bits, palpate::names_of(tick_flag_table()));
 }
 
 DiagnosticStatus status(const std::string& name, std::uint8_t level, std::string message) {
@@ -175,35 +172,30 @@ DiagnosticStatus camera_status(const CameraStatus& camera, double now) {
   return made;
 }
 
-// What is said of a hand's contact.
-struct Contact {
-  std::string name;  // of the hand, with a blank behind it; empty: the first one
-  const TickReport& ticks;
-  std::uint32_t latched_by;
-  std::size_t pop_throughs;
-};
-
-DiagnosticStatus contact_status(const Contact& contact, bool held) {
-  const ServoTick& newest = contact.ticks.newest;
+// @param name  of the hand, with a blank behind it; empty: the first one
+// @param held  the force is paused
+DiagnosticStatus contact_status(const std::string& name, const TickReport& ticks,
+                                const SessionHandState& hand, bool held) {
+  const ServoTick& newest = ticks.newest;
   DiagnosticStatus made =
-      status(contact.name + "contact", DiagnosticStatus::ok, to_string(newest.tick.state));
+      status(name + "contact", DiagnosticStatus::ok, to_string(newest.tick.state));
   if (held) made.message += "; the force is paused (~/release ends this)";
-  if (contact.latched_by != 0) {
+  if (hand.latched_by != 0) {
     made.level = DiagnosticStatus::error;
-    made.message = "no force: latched by " + names_of(contact.latched_by, safety_flag_names()) +
+    made.message = "no force: latched by " + names_of(hand.latched_by, safety_flag_names()) +
                    " (~/reset_faults ends that)";
   }
   made.values = {{"force asked for [N]", number(newest.tick.force.norm())},
                  {"force sent [N]", number(newest.force.norm())},
                  {"gain", number(newest.gain)},
                  {"age of the frame [s]", number(newest.frame_age)},
-                 {"flags", tick_flags(contact.ticks.flags)},
-                 {"safety flags", names_of(contact.ticks.safety, safety_flag_names())},
-                 {"pop-throughs suspected", std::to_string(contact.pop_throughs)}};
+                 {"flags", tick_flags(ticks.flags)},
+                 {"safety flags", names_of(ticks.safety, safety_flag_names())},
+                 {"pop-throughs suspected", std::to_string(hand.summary.pop_throughs)}};
   return made;
 }
 
-// @param name     as Contact's
+// @param name     as above
 // @param trouble  of the device, in more words than its fault has; may be empty
 DiagnosticStatus device_status(const std::string& name, const TickReport& ticks,
                                const std::string& trouble, const DeviceInfo& device) {
@@ -252,28 +244,21 @@ ros::MarkerArray markers_of(const ServoTick& record, double contact_radius,
        arrow(header, "normal", tick.proxy, normal_length * tick.normal, normal_colour)}};
 }
 
-// Loop, cameras, each hand's contact and device, and recording, each with its level.
-ros::DiagnosticArray diagnostics_of(const SessionReport& report, const DeviceInfo& device,
-                                    const ros::Header& header) {
+ros::DiagnosticArray diagnostics_of(const SessionReport& report, const ros::Header& header) {
   ros::DiagnosticArray array;
   array.header = header;
   array.status.push_back(loop_status(report));
-  for (const CameraStatus& camera : report.state.cameras)
-    array.status.push_back(camera_status(camera, report.now));
   const SessionState& state = report.state;
-  array.status.push_back(contact_status(
-      {"", report.ticks, state.hands[0].latched_by, state.hands[0].summary.pop_throughs},
-      state.held));
-  array.status.push_back(device_status("", report.ticks, state.hands[0].device.text, device));
-  for (std::size_t i = 0; i < report.more_hands.size() && i + 1 < state.hands.size(); ++i) {
-    const SessionHandState& hand = state.hands[i + 1];
-    const auto& [ticks, info] = report.more_hands[i];
-    const std::string name = hand.name + " ";
-    array.status.push_back(
-        contact_status({name, ticks, hand.latched_by, hand.summary.pop_throughs}, state.held));
-    array.status.push_back(device_status(name, ticks, hand.device.text, info));
+  for (const CameraStatus& camera : state.cameras)
+    array.status.push_back(camera_status(camera, report.now));
+  for (std::size_t i = 0; i < report.hands.size(); ++i) {
+    const auto& [ticks, device] = report.hands[i];
+    const SessionHandState& hand = state.hands[i];
+    const std::string name = i == 0 ? "" : hand.name + " ";
+    array.status.push_back(contact_status(name, ticks, hand, state.held));
+    array.status.push_back(device_status(name, ticks, hand.device.text, device));
   }
-  array.status.push_back(recording_status(report.state.recording));
+  array.status.push_back(recording_status(state.recording));
   return array;
 }
 
@@ -315,7 +300,6 @@ std::array<std::uint8_t, size> identity(const dds::Guid& guid) {
   return bytes;
 }
 
-// The topics of a hand, and what has been read of it.
 struct HandTopics {
   HandTopics(dds::Participant& participant, const std::string& name,
              const TickRing<ServoTick>::Reader& reader)
@@ -380,11 +364,22 @@ class Node final : public RosNode {
         set_all_(participant_, name_ + "/set_parameters_atomically", 2,
                  [this](const auto& request) { return set_together(request); }),
         get_(participant_, name_ + "/get_parameters", 3,
-             [this](const auto& request) { return get(request); }),
+             [this](const auto& names) {
+               return each<ros::GetParameters>(
+                   names, [&, settings = session_.settings()](const auto& name) {
+                     return parameters_.get(settings, name);
+                   });
+             }),
         types_(participant_, name_ + "/get_parameter_types", 4,
-               [this](const auto& request) { return types(request); }),
+               [this](const auto& names) {
+                 return each<ros::GetParameterTypes>(
+                     names, [&](const auto& name) { return parameters_.describe(name).type; });
+               }),
         describe_(participant_, name_ + "/describe_parameters", 5,
-                  [this](const auto& request) { return describe(request); }),
+                  [this](const auto& names) {
+                    return each<ros::DescribeParameters>(
+                        names, [&](const auto& name) { return parameters_.describe(name); });
+                  }),
         list_(participant_, name_ + "/list_parameters", 6,
               [this](const ros::ListParameters::Request& request) {
                 return ros::ListParameters::Reply{{}, parameters_.list(request.content)};
@@ -499,7 +494,6 @@ class Node final : public RosNode {
   void report(double now) {
     SessionReport report;
     report.state = session_.state();
-    report.ticks = hands_.front()->second;
     report.now = now;
     const std::uint64_t ticks = session_.statistics().ticks.load();
     report.tick_rate =
@@ -508,11 +502,11 @@ class Node final : public RosNode {
     counted_at_ = now;
     counted_ticks_ = ticks;
     counted_late_ = report.state.hands[0].summary.late_ticks;
-    for (std::size_t i = 1; i < hands_.size(); ++i)
-      report.more_hands.push_back({hands_[i]->second, session_.device(i).info()});
-    for (const auto& hand : hands_) hand->second.flags = hand->second.safety = 0;
-    diagnostics_.write(
-        diagnostics_of(report, session_.device().info(), {dds::stamp_of(now), frame_}));
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      report.hands.push_back({hands_[i]->second, session_.device(i).info()});
+      hands_[i]->second.flags = hands_[i]->second.safety = 0;
+    }
+    diagnostics_.write(diagnostics_of(report, {dds::stamp_of(now), frame_}));
     tell_changes();
   }
 
@@ -588,25 +582,11 @@ class Node final : public RosNode {
     return reply;
   }
 
-  ros::GetParameters::Reply get(const ros::GetParameters::Request& request) {
-    ros::GetParameters::Reply reply;
-    const ServoSettings settings = session_.settings();
-    for (const std::string& name : request.content)
-      reply.content.push_back(parameters_.get(settings, name));
-    return reply;
-  }
-
-  ros::GetParameterTypes::Reply types(const ros::GetParameterTypes::Request& request) {
-    ros::GetParameterTypes::Reply reply;
-    for (const std::string& name : request.content)
-      reply.content.push_back(parameters_.describe(name).type);
-    return reply;
-  }
-
-  ros::DescribeParameters::Reply describe(const ros::DescribeParameters::Request& request) {
-    ros::DescribeParameters::Reply reply;
-    for (const std::string& name : request.content)
-      reply.content.push_back(parameters_.describe(name));
+  // What `of` says of each of the names that a service is asked for.
+  template <class Service, class Of>
+  static typename Service::Reply each(const typename Service::Request& names, const Of& of) {
+    typename Service::Reply reply;
+    for (const std::string& name : names.content) reply.content.push_back(of(name));
     return reply;
   }
 

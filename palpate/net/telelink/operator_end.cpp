@@ -11,7 +11,6 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
-#include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/tool/tool_shape.hpp"
 #include "palpate/net/telelink/touched_paint.hpp"

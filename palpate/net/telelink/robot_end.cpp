@@ -34,7 +34,6 @@ class Borrowed final : public Device {
   std::shared_ptr<LedHand> hand_;
 };
 
-// The walls of what the robot reaches.
 void add_walls(const Eigen::AlignedBox3d& reach, std::vector<Fixture>& fixtures) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
@@ -77,7 +76,6 @@ double reach_of(const RobotInfo& info, const RobotEndOptions& options) {
   return tool->reach() + options.margin;
 }
 
-// [m] As LeadLimits::lever.
 double lever_of(double reach) { return std::max(LeadLimits{}.lever, reach); }
 
 LeadLimits limits_of(const RobotInfo& info, double reach) {

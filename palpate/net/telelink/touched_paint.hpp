@@ -24,17 +24,11 @@ std::string paint_touched(Paint& paint, const Parameters& parameters, const Touc
 /// x, y, z [m], normal's x, y, z, stiffness [N/m], friction; what is not known is no number.
 inline ros::Float64MultiArray message_of(const Touched& touched) {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  const Vec3& place = touched.place;
-  const Vec3& normal = touched.normal;
+  Eigen::Matrix<double, 8, 1> row;
+  row << touched.place, touched.normal, touched.stiffness.value_or(unknown),
+      touched.friction.value_or(unknown);
   ros::Float64MultiArray message;
-  message.data = {place.x(),
-                  place.y(),
-                  place.z(),
-                  normal.x(),
-                  normal.y(),
-                  normal.z(),
-                  touched.stiffness.value_or(unknown),
-                  touched.friction.value_or(unknown)};
+  message.data.assign(row.data(), row.data() + row.size());
   return message;
 }
 

@@ -26,7 +26,6 @@ enum Kind : std::uint8_t {
   hand = 16,
   shown = 17
 };
-// What a hand message says of the hand.
 enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
 enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
 // Whose pixels colours are: nobody's, those of the depth or the points, another camera's.
@@ -118,6 +117,18 @@ std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared_bytes(
   return {std::as_bytes(std::span<const float>(*owner)), owner};
 }
 
+// @param counts  what says how many numbers there are
+template <class... Counts>
+ViewerMessage numbers_message(Kind kind, std::uint8_t camera, std::vector<float> numbers,
+                              Counts... counts) {
+  ViewerMessage message;
+  Writer writer(message.head);
+  writer.put(kind).put(camera).put(std::uint16_t{0});
+  (writer.put(static_cast<std::uint32_t>(counts)), ...);
+  std::tie(message.payload, message.owner) = shared_bytes(std::move(numbers));
+  return message;
+}
+
 }  // namespace
 
 ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
@@ -145,14 +156,8 @@ ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
 
 ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
   if (txyz.size() % 4 != 0) throw Error("path for the viewer", "each point needs four numbers");
-  ViewerMessage message;
-  Writer(message.head)
-      .put(Kind::path)
-      .put(camera)
-      .put(std::uint16_t{0})
-      .put(static_cast<std::uint32_t>(txyz.size() / 4));
-  std::tie(message.payload, message.owner) = shared_bytes(std::move(txyz));
-  return message;
+  const std::size_t places = txyz.size() / 4;
+  return numbers_message(Kind::path, camera, std::move(txyz), places);
 }
 
 ViewerMessage tool_message(const ToolShape* tool) {
@@ -162,23 +167,15 @@ ViewerMessage tool_message(const ToolShape* tool) {
     for (int axis = 0; axis < 3; ++axis) values.push_back(static_cast<float>(point[axis]));
   for (const auto& corners : surface.triangles)
     for (const std::uint32_t corner : corners) values.push_back(std::bit_cast<float>(corner));
-  ViewerMessage message;
-  Writer(message.head)
-      .put(std::uint32_t{Kind::tool})
-      .put(static_cast<std::uint32_t>(surface.points.size()))
-      .put(static_cast<std::uint32_t>(surface.triangles.size()));
-  std::tie(message.payload, message.owner) = shared_bytes(std::move(values));
-  return message;
+  return numbers_message(Kind::tool, 0, std::move(values), surface.points.size(),
+                         surface.triangles.size());
 }
 
 ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
                            std::vector<float> rays) {
   if (rays.size() != 2 * std::size_t{width} * height)
     throw Error("rays for the viewer", "there are not two numbers for each pixel");
-  ViewerMessage message;
-  Writer(message.head).put(Kind::rays).put(camera).put(std::uint16_t{0}).put(width).put(height);
-  std::tie(message.payload, message.owner) = shared_bytes(std::move(rays));
-  return message;
+  return numbers_message(Kind::rays, camera, std::move(rays), width, height);
 }
 
 ViewerMessage ticks_message(const TickBatch& batch) {
@@ -304,18 +301,6 @@ std::optional<Command> parse_command(std::string_view message) {
   }
 }
 
-namespace {
-
-// [m] How far the HIP is below the surface, which is one contact radius below the proxy.
-double penetration_of(const Tick& tick, double contact_radius) {
-  if (tick.state == ContactState::free_motion) return 0.0;
-  const Vec3 out = tick.proxy - tick.hip;
-  const double below = tick.normal.isZero() ? out.norm() : out.dot(tick.normal);
-  return std::max(0.0, below - contact_radius);
-}
-
-}  // namespace
-
 void TickBatcher::add(const ServoTick& record, double contact_radius) {
   const Tick& tick = record.tick;
   batch_.tick = record;
@@ -323,7 +308,11 @@ void TickBatcher::add(const ServoTick& record, double contact_radius) {
   batch_.safety |= record.safety;
   any_ = true;
 
-  const double penetration = penetration_of(tick, contact_radius);
+  // How far the HIP is below the surface, which is one contact radius below the proxy.
+  const Vec3 out = tick.proxy - tick.hip;
+  const double below = tick.normal.isZero() ? out.norm() : out.dot(tick.normal);
+  const bool touches = tick.state != ContactState::free_motion;
+  const double penetration = touches ? std::max(0.0, below - contact_radius) : 0.0;
   sample_.t = tick.t;
   sample_.force = std::max(sample_.force, static_cast<float>(record.force.norm()));
   sample_.penetration = std::max(sample_.penetration, static_cast<float>(penetration));

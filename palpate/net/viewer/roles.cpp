@@ -37,6 +37,16 @@ std::string amount(const SafetyParameterInfo& row, double value) {
   return number_text(value) + (row.unit == "-" ? "" : " " + std::string(row.unit));
 }
 
+constexpr std::size_t remembered_tokens = 16;  // of an address: pages left open from before
+
+using Padded = std::array<unsigned char, longest_token>;
+
+Padded padded(std::string_view token) {
+  Padded bytes{};
+  std::copy_n(token.begin(), std::min(token.size(), bytes.size()), bytes.begin());
+  return bytes;
+}
+
 }  // namespace
 
 std::string_view to_string(Role role) {
@@ -123,19 +133,6 @@ void LimitBounds::check(std::string_view name, double value, Role role) const {
 void LimitBounds::set_by_operator(std::string_view name, double value) {
   safety_parameter(name).set(operators_, value);
 }
-namespace {
-
-constexpr std::size_t remembered_tokens = 16;  // of an address: pages left open from before
-
-using Padded = std::array<unsigned char, longest_token>;
-
-Padded padded(std::string_view token) {
-  Padded bytes{};
-  std::copy_n(token.begin(), std::min(token.size(), bytes.size()), bytes.begin());
-  return bytes;
-}
-
-}  // namespace
 
 bool is_token(std::string_view given, std::string_view token) {
   const Padded a = padded(given);

@@ -69,8 +69,17 @@ bool is_loopback_name(const std::string& host) {
   return !error && address.is_loopback();
 }
 
+std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
+
+// What a request asks for, without its options.
+std::string_view path_of(const Request& request) {
+  const std::string_view target = view(request.target());
+  return target.substr(0, target.find('?'));
+}
+
 // The value of an option behind the '?' of a request's target; empty if it is not there.
-std::string_view option_of(std::string_view target, std::string_view key) {
+std::string_view option_of(const Request& request, std::string_view key) {
+  const std::string_view target = view(request.target());
   const std::size_t question = target.find('?');
   if (question == std::string_view::npos) return {};
   std::string_view query = target.substr(question + 1);
@@ -82,8 +91,6 @@ std::string_view option_of(std::string_view target, std::string_view key) {
   }
   return {};
 }
-
-std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
 // Whom a connection comes from: an address, of IPv6 the network, as one machine has many.
 std::string source_of(const tcp::socket& socket) {
@@ -173,7 +180,6 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   }
   void may_explain_again() { explained_ = false; }
 
-  // Why what the page asked for was not done.
   void refuse(std::string_view why) {
     send(std::make_shared<const ViewerMessage>(text_message(nlohmann::json{{"error", why}}.dump(
         -1, ' ', false, nlohmann::json::error_handler_t::replace))));
@@ -357,12 +363,10 @@ class ViewerServer::Impl final : public Hub {
     if (!is_from_here(request)) return {http::status::forbidden};
     // A page that was refused asks once more without an upgrade: browsers do not tell it why.
     const bool upgrades = websocket::is_upgrade(request);
-    const std::string_view target = view(request.target());
-    const std::string_view path = target.substr(0, target.find('?'));
-    if (path == "/splat" && !upgrades)
-      return judge_token(option_of(target, "token"), source, false);
+    const std::string_view path = path_of(request);
+    if (path == "/splat" && !upgrades) return judge_token(request, source, false);
     if (path != "/session") return {upgrades ? http::status::not_found : http::status::ok};
-    Admission admission = judge_token(option_of(target, "token"), source, upgrades);
+    Admission admission = judge_token(request, source, upgrades);
     if (admission.status != http::status::ok) return admission;
     if (admission.is_operator) admission.place = take_place(operator_pages_, max_operator_pages);
     if (!admission.place) admission.place = take_place(viewer_pages_, max_viewers);
@@ -373,9 +377,8 @@ class ViewerServer::Impl final : public Hub {
   // May whoever asks send a file? Only the operator's page may, one at a time.
   http::status judge_file(const Request& request, const std::string& source) {
     if (!is_from_here(request)) return http::status::forbidden;
-    const std::string_view target = view(request.target());
-    if (target.substr(0, target.find('?')) != "/file") return http::status::not_found;
-    const Admission admission = judge_token(option_of(target, "token"), source, false);
+    if (path_of(request) != "/file") return http::status::not_found;
+    const Admission admission = judge_token(request, source, false);
     if (admission.status != http::status::ok) return admission.status;
     if (!admission.is_operator) return http::status::unauthorized;
     return receiving_ ? http::status::conflict : http::status::ok;
@@ -458,7 +461,8 @@ class ViewerServer::Impl final : public Hub {
   // Whose token is it? On a loopback address that asks for none, a wrong one lets in who looks,
   // such as a page left open from an earlier session; it counts as a guess all the same.
   // @param enters  whether a session begins: that uses up the token with which a page is opened
-  Admission judge_token(std::string_view given, const std::string& source, bool enters) {
+  Admission judge_token(const Request& request, const std::string& source, bool enters) {
+    const std::string_view given = option_of(request, "token");
     if (given.empty()) return {token_.empty() ? http::status::ok : http::status::unauthorized};
     const double t = Seconds(Clock::now().time_since_epoch()).count();
     if (guesses_.pause(source, t) > 0.0) return {http::status::too_many_requests};
@@ -507,7 +511,6 @@ class ViewerServer::Impl final : public Hub {
   void accept();
   void make_room();
 
-  // Every ticks_interval.
   void wait() {
     timer_.expires_after(ticks_interval);
     timer_.async_wait([this](beast::error_code error) {
@@ -524,17 +527,14 @@ class ViewerServer::Impl final : public Hub {
     }
     const std::optional<TickBatch> batch = host_.ticks();  // also when nobody looks: it drains
     if (pages_.empty()) return;
-    if (batch) {
-      const auto message = std::make_shared<const ViewerMessage>(ticks_message(*batch));
-      for (const auto& page : pages_) page->send(message);
-    }
-    const auto tell = [this](const std::string& verb, const std::string& what) {
-      if (what.empty()) return;
-      const SharedMessage message = shared_text("{\"" + verb + "\":" + what + "}");
+    const auto tell = [this](const SharedMessage& message) {
       for (const auto& page : pages_) page->send(message);
     };
-    tell("robot", host_.robot());
-    tell("more_hands", host_.more_hands());
+    if (batch) tell(std::make_shared<const ViewerMessage>(ticks_message(*batch)));
+    if (const std::string robot = host_.robot(); !robot.empty())
+      tell(shared_text("{\"robot\":" + robot + "}"));
+    if (const std::string hands = host_.more_hands(); !hands.empty())
+      tell(shared_text("{\"more_hands\":" + hands + "}"));
     if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 
@@ -652,7 +652,6 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   }
 
   [[nodiscard]] const std::string& source() const { return source_; }
-  // Closes the connection, whatever it is doing.
   void close() { stream_.close(); }
 
  private:
@@ -669,7 +668,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
       return say(request, http::status::length_required, "The file's length is missing.\n");
     beast::error_code error;
     try {
-      const std::string name(option_of(view(request.target()), "name"));
+      const std::string name(option_of(request, "name"));
       file_ = server_.host_.begin_file(name, *size);
     } catch (const std::exception& refusal) {
       return say(request, http::status::unprocessable_entity, refusal.what());
@@ -734,27 +733,15 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
           ->start(request);
       return;
     }
-    const std::string_view asked = view(request.target());
-    if (admission.status == http::status::ok && asked.substr(0, asked.find('?')) == "/splat" &&
-        give_splat(request))
-      return;
-    std::string_view type = "text/plain; charset=utf-8";
-    std::string_view content;
     http::status status = admission.status;
     if (status == http::status::ok) {
-      const std::string_view path = asked.substr(0, asked.find('?'));
-      const auto files = page_files();
-      const auto file = std::find_if(files.begin(), files.end(),
-                                     [&](const PageFile& f) { return f.path == path; });
-      if (file == files.end()) {
-        status = http::status::not_found;
-      } else {
-        type = file->type;
-        content = file->content;
-      }
+      const std::string_view path = path_of(request);
+      if (path == "/splat" && give_splat(request)) return;
+      for (const PageFile& file : page_files())
+        if (file.path == path) return write(request, status, file.type, file.content);
+      status = http::status::not_found;
     }
-    if (status != http::status::ok) content = explanation(status);
-    write(request, status, type, content);
+    write(request, status, "text/plain; charset=utf-8", explanation(status));
   }
 
   // What pages draw of the splat that is felt. @return whether there is one

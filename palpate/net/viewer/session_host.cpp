@@ -22,21 +22,21 @@
 #include "palpate/servo/stiffness.hpp"
 
 namespace palpate {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PortEnergy, made, generating)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SceneChoice, uri, meaning, group)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Playback, paused, loop, speed)
+
 namespace {
 
 using nlohmann::json;
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
-// Tools that a page can choose.
 constexpr std::array<const char*, 7> tools = {
     "ball",        "box:40x20x5mm",    "box:30x30x30mm", "capsule:80x8mm", "cylinder:40x20mm",
     "cone:60x6mm", "gripper:40x30x8mm"};
 
 json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-
-json energy_of(const PortEnergy& port) {
-  return {{"made", port.made}, {"generating", port.generating}};
-}
 
 template <class Owner>
 json rows_json(std::span<const ParameterRow<Owner>> table) {
@@ -53,7 +53,6 @@ json rows_json(std::span<const ParameterRow<Owner>> table) {
   return rows;
 }
 
-// What the numbers of a table are now, by name.
 template <class Owner>
 json values_json(std::span<const ParameterRow<Owner>> table, const Owner& owner) {
   json values;
@@ -90,26 +89,16 @@ std::string_view stricter_text(std::string_view limit) {
   return names[static_cast<std::size_t>(stricter_direction(limit))];
 }
 
-json row_by_row(const Eigen::Matrix<double, 3, 4>& pose) {
-  json numbers = json::array();
-  for (int i = 0; i < 12; ++i) numbers.push_back(pose(i / 4, i % 4));
-  return numbers;
-}
-
-// What the page draws of a fixture.
 json fixture_to_draw(const Fixture& fixture) {
-  json pose = row_by_row(fixture.world_from_fixture.matrix().topRows<3>());
+  json pose = json::array();  // row by row
+  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
   Vec3 size = fixture.size;
   json points = nlohmann::json::array();
   if (fixture.shape == FixtureShape::mesh) {  // its box
-    Vec3 low = fixture.points.front();
-    Vec3 high = low;
-    for (const Vec3& point : fixture.points) {
-      low = low.cwiseMin(point);
-      high = high.cwiseMax(point);
-    }
-    size = high - low;
-    const Vec3 middle = fixture.world_from_fixture * Vec3(0.5 * (low + high));
+    Eigen::AlignedBox3d box;
+    for (const Vec3& point : fixture.points) box.extend(point);
+    size = box.sizes();
+    const Vec3 middle = fixture.world_from_fixture * box.center();
     for (int axis = 0; axis < 3; ++axis)
       pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
   } else {
@@ -123,6 +112,28 @@ json fixture_to_draw(const Fixture& fixture) {
           {"radius", fixture.radius},
           {"length", fixture.length},
           {"points", points}};
+}
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t keep_free = 100'000'000;  // [bytes] of the disk
+
+bool is_simple_name(const std::string& name) {
+  return !name.empty() && name.size() <= DroppedFiles::longest_name && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), [](unsigned char c) {
+           return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_';
+         });
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 999'999) / 1'000'000) + " MB";
+}
+
+fs::path make_folder() {
+  std::string name = (fs::temp_directory_path() / DroppedFiles::folder_prefix).string() + "XXXXXX";
+  if (mkdtemp(name.data()) == nullptr)
+    throw Error(name, "cannot be made", "set TMPDIR to a folder that can be written");
+  return name;
 }
 
 }  // namespace
@@ -170,12 +181,9 @@ std::string SessionHost::hello() {
   if (first_tool_ &&
       std::find(choices.begin(), choices.end(), first_tool_->text()) == choices.end())
     choices.push_back(first_tool_->text());
-  json scenes = json::array();
-  for (const SceneChoice& scene : rules_.scenes)
-    scenes.push_back({{"uri", scene.uri}, {"meaning", scene.meaning}, {"group", scene.group}});
   const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
   return json{{"file_limit", most},
-              {"scenes", scenes},
+              {"scenes", rules_.scenes},
               {"notice", rules_.notice},
               {"splat", Uri(session_->state().cameras.front().uri).scheme() == "splat"},
               {"version", version_},
@@ -302,10 +310,7 @@ std::string SessionHost::state() {
                        {"frames", status.recorded},
                        {"place", status.place},
                        {"time", status.recorded_time}});
-    if (status.recorded > 1 && playback.is_null())
-      playback = {{"paused", status.playback.paused},
-                  {"loop", status.playback.loop},
-                  {"speed", status.playback.speed}};
+    if (status.recorded > 1 && playback.is_null()) playback = status.playback;
   }
   json points;
   if (proposed_)
@@ -379,8 +384,8 @@ std::string SessionHost::state() {
       {"pop_throughs", first.summary.pop_throughs},
       {"energy",
        {{"contacts", first.summary.energy.contacts},
-        {"relative", energy_of(first.summary.energy.relative)},
-        {"absolute", energy_of(first.summary.energy.absolute)}}},
+        {"relative", first.summary.energy.relative},
+        {"absolute", first.summary.energy.absolute}}},
       {"fixtures", fixtures},
       {"paint",
        {{"brush", brush}, {"dabs", dabs}, {"materials", paintable()}, {"trouble", brush_trouble_}}},
@@ -426,12 +431,6 @@ std::string SessionHost::more_hands() {
   return hands.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-// [m] between the proxy and what it touches; a tool touches with its own surface.
-double SessionHost::contact_radius() const {
-  const ServoSettings settings = session_->settings();
-  return settings.tool ? 0.0 : settings.parameters.proxy.r_c();
-}
-
 // To all pages, if it is another than before.
 void SessionHost::show_tool(const std::shared_ptr<const ToolShape>& tool) {
   ViewerServer* server = server_.load(std::memory_order_acquire);
@@ -441,7 +440,9 @@ void SessionHost::show_tool(const std::shared_ptr<const ToolShape>& tool) {
 }
 
 std::optional<TickBatch> SessionHost::ticks() {
-  const double radius = contact_radius();
+  const ServoSettings settings = session_->settings();
+  // [m] between the proxy and what it touches; a tool touches with its own surface.
+  const double radius = settings.tool ? 0.0 : settings.parameters.proxy.r_c();
   const bool has_torque = session_->device().info().limits.max_torque > 0.0;
   for (ServoTick record{}; reader_->try_pop(record);) {
     if (!has_torque) record.torque = record.gain * record.tick.torque;  // shown, never felt
@@ -679,31 +680,6 @@ void SessionHost::show_rays(std::uint8_t camera, const ViewingRays& rays) {
   server_.load()->show(camera, rays_message(camera, static_cast<std::uint32_t>(k.width),
                                             static_cast<std::uint32_t>(k.height), std::move(xy)));
 }
-namespace {
-
-namespace fs = std::filesystem;
-
-constexpr std::uint64_t keep_free = 100'000'000;  // [bytes] of the disk
-
-bool is_simple_name(const std::string& name) {
-  return !name.empty() && name.size() <= DroppedFiles::longest_name && name.front() != '.' &&
-         std::all_of(name.begin(), name.end(), [](unsigned char c) {
-           return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_';
-         });
-}
-
-std::string megabytes(std::uint64_t bytes) {
-  return std::to_string((bytes + 999'999) / 1'000'000) + " MB";
-}
-
-fs::path make_folder() {
-  std::string name = (fs::temp_directory_path() / DroppedFiles::folder_prefix).string() + "XXXXXX";
-  if (mkdtemp(name.data()) == nullptr)
-    throw Error(name, "cannot be made", "set TMPDIR to a folder that can be written");
-  return name;
-}
-
-}  // namespace
 
 DroppedFiles::~DroppedFiles() {
   std::error_code unused;

@@ -137,7 +137,6 @@ class SessionHost final : public ViewerHost {
 
  private:
   [[nodiscard]] std::vector<std::string> paintable() const;
-  [[nodiscard]] double contact_radius() const;
   void show_tool(const std::shared_ptr<const ToolShape>& tool);
   [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
   void look_at_points(const std::string& uri);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/record/session.hpp"
 
-#include <algorithm>
-#include <bit>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -38,52 +36,6 @@ auto parsed(const std::string& text, const std::string& name, const Read& read) 
   }
 }
 
-// One walk over a tick's fields names, writes and reads them, so that the three cannot differ.
-template <class Way, class T>
-void walk(Way& way, T& record) {
-  auto& tick = record.tick;
-  way("t", tick.t);
-  way("hip", tick.hip);
-  way("proxy", tick.proxy);
-  way("normal", tick.normal);
-  way("rendered_force", tick.force);
-  way("state", tick.state);
-  way("steps", tick.steps);
-  way("surface_velocity", tick.surface_velocity);
-  way("frame", tick.frame);
-  way("flags", tick.flags);
-  way("force", record.force);
-  way("position", record.position);
-  way("gain", record.gain);
-  way("frame_stamp", record.frame_stamp);
-  way("frame_age", record.frame_age);
-  way("number", record.number);
-  way("frame_number", record.frame_number);
-  way("settings_number", record.settings_number);
-  way("safety", record.safety);
-  way("wake_up_ns", record.wake_up_ns);
-  way("previous_compute_ns", record.previous_compute_ns);
-  way("hand", record.hand);
-  way("surface_motion", tick.surface_motion);
-  const auto walk_port = [&way](const std::string& name, auto& port) {
-    way(name + "_excess", port.excess);
-    way(name + "_most", port.most);
-    way(name + "_made", port.made);
-    way(name + "_generating", port.generating);
-  };
-  walk_port("relative", record.energy.relative);
-  walk_port("absolute", record.energy.absolute);
-  way("contacts", record.energy.contacts);
-  way("region", record.region);
-  way("guidance", record.guidance);
-  way("fixtures", record.fixtures);
-  way("handle", record.handle);
-  way("orientation", tick.orientation);
-  way("proxy_orientation", tick.proxy_orientation);
-  way("rendered_torque", tick.torque);
-  way("torque", record.torque);
-}
-
 // A tool's points, so that a replay needs no mesh.
 json tool_json(const ToolShape& tool) {
   json numbers = json::array();
@@ -105,56 +57,6 @@ std::shared_ptr<const ToolShape> tool_from_json(const json& object) {
 }
 
 }  // namespace
-
-const std::vector<std::string>& tick_columns() {
-  static const std::vector<std::string> columns = [] {
-    NameNumbers names;
-    const ServoTick tick;
-    walk(names, tick);
-    return std::move(names.names);
-  }();
-  return columns;
-}
-
-std::vector<double> row_of(const ServoTick& tick) {
-  std::vector<double> row(tick_columns().size());
-  PutNumbers put(row);
-  walk(put, tick);
-  return row;
-}
-
-void add_to_hash(std::uint64_t& hash, const ServoTick& tick) {
-  static const auto count = static_cast<std::size_t>(
-      std::find(tick_columns().begin(), tick_columns().end(), "hand") - tick_columns().begin() + 1);
-  const std::vector<double> row = row_of(tick);
-  for (const double number : std::span(row).first(count)) {
-    const auto bits = std::bit_cast<std::uint64_t>(number);
-    for (int byte = 0; byte < 8; ++byte)
-      hash = (hash ^ (bits >> 8 * byte & 0xffU)) * 0x100000001b3U;
-  }
-}
-
-TickRows::TickRows(std::span<const std::string> columns) : width_(columns.size()) {
-  for (const std::string& name : tick_columns()) {
-    const auto found = std::find(columns.begin(), columns.end(), name);
-    places_.push_back(found == columns.end() ? std::nullopt
-                                             : std::optional<std::size_t>(found - columns.begin()));
-  }
-}
-
-ServoTick TickRows::read(std::span<const double> row, const std::string& name) const {
-  if (row.size() != width_)
-    throw Error(
-        name, "has " + std::to_string(row.size()) + " numbers instead of " + std::to_string(width_),
-        "it may be damaged");
-  ServoTick tick;
-  std::vector<double> all = row_of(tick);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (has(i)) all[i] = row[*places_[i]];
-  GetNumbers get(all, name);
-  walk(get, tick);
-  return tick;
-}
 
 std::vector<double> row_of(const AdoptedFrame& frame) {
   std::vector<double> row{static_cast<double>(frame.number), frame.stamp, frame.put_at};
@@ -187,12 +89,16 @@ std::filesystem::path hand_folder(const std::filesystem::path& first, const std:
   return first / hand;
 }
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DeviceLimits, max_force, continuous_force, max_torque)
-
 std::string to_json(const SessionInfo& info) {
-  json object = {{"palpate", info.version}, {"cameras", info.cameras},
-                 {"device", info.device},   {"device_limits", info.limits},
-                 {"epoch_ns", info.epoch},  {"tick_columns", tick_columns()}};
+  json object = {{"palpate", info.version},
+                 {"cameras", info.cameras},
+                 {"device", info.device},
+                 {"device_limits",
+                  {{"max_force", info.limits.max_force},
+                   {"continuous_force", info.limits.continuous_force},
+                   {"max_torque", info.limits.max_torque}}},
+                 {"epoch_ns", info.epoch},
+                 {"tick_columns", tick_columns()}};
   if (!info.hand.empty()) object["hand"] = info.hand;
   if (!info.more_hands.empty()) object["more_hands"] = info.more_hands;
   if (info.frames_in_parent) object["frames_in_parent"] = true;
@@ -206,7 +112,10 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     info.cameras = object.at("cameras").get<std::vector<std::string>>();
     info.device = object.at("device").get<std::string>();
     info.epoch = whole_of<std::int64_t>(object.at("epoch_ns"), name);
-    object.at("device_limits").get_to(info.limits);
+    const json& limits = object.at("device_limits");
+    info.limits = {.max_force = limits.at("max_force").get<double>(),
+                   .continuous_force = limits.at("continuous_force").get<double>(),
+                   .max_torque = limits.at("max_torque").get<double>()};
     info.tick_columns = object.at("tick_columns").get<std::vector<std::string>>();
     info.hand = object.value("hand", std::string());
     info.more_hands = object.value("more_hands", std::vector<std::string>());

@@ -184,15 +184,15 @@ Interval share_of(const std::string& digits) {
 
 // Of each part of `fidelity`, the share of the aims that are met. What has no noise counts in all
 // of them; what was lost in every repeat has no figure and misses its aim.
-std::vector<double> aims_met(const Json& parts) {
+std::vector<double> aims_met(const Json& fidelity) {
   std::vector<double> shares;
-  for (std::size_t part = 0; part < parts.size(); ++part) {
+  for (std::size_t part = 0; part < fidelity.size(); ++part) {
     int aims = 0;
     int met = 0;
     for (const FidelityMeasure& measure : fidelity_measures()) {
       if (!measure.aim) continue;
       const Json& values =
-          parts.at(is_without_chance(measure.scene) ? 0 : part).at(std::string(measure.scene));
+          fidelity.at(is_without_chance(measure.scene) ? 0 : part).at(std::string(measure.scene));
       const auto found = values.find(std::string(measure.name));
       ++aims;
       met += found != values.end() && found->get<double>() <= *measure.aim ? 1 : 0;

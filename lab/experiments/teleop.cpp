@@ -125,7 +125,7 @@ std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOpt
 // The worst over links with and without jitter and loss, by delay.
 Scores teleop_scores(const Table& table) {
   // What only says something where the hand presses.
-  const auto pressed = [](const Column& column) {
+  const auto if_pressed = [](const Column& column) {
     return Column{column.title, [=](const Table& group) {
                     return group.number(0, "force") > 0.0 ? column.text(group) : "-";
                   }};
@@ -146,10 +146,10 @@ Scores teleop_scores(const Table& table) {
   };
   return scores_by(
       table, {"way", "scene", "sensor"},
-      {pressed({"force [N], 0 to 500 ms", range}), pressed({"worst, %", worst}),
-       most("shake [mm]", "shake", "{:.3f}"), pressed(most("made [mJ]", "energy", "{:.2f}")),
+      {if_pressed({"force [N], 0 to 500 ms", range}), if_pressed({"worst, %", worst}),
+       most("shake [mm]", "shake", "{:.3f}"), if_pressed(most("made [mJ]", "energy", "{:.2f}")),
        most("depth [mm]", "depth", "{:.2f}"), most("contact [N]", "contact", "{:.1f}"),
-       pressed(most("tool's swing [mm]", "swing", "{:.2f}"))},
+       if_pressed(most("tool's swing [mm]", "swing", "{:.2f}"))},
       "The worst of round trips from 0 to 500 ms, with and without jitter of 30 ms and 5 % loss. "
       "Worst, %: of the force against that without delay. Aims: 5 %, 0.05 mm, 0.1 mJ; depth 0.5 mm "
       "(rest), 1 mm (bob, come); 5 N. Measures: docs/teleop.md.");

@@ -225,8 +225,8 @@ class Ros1File final : public ChunkedBag {
     const std::optional<Record> record = record_at(place);
     if (!record) at(place).fail("has a chunk that ends behind the end of the file");
     const Ros1Head head(record->head, at(place));
-    unpack(head.text("compression"), content_of(*record), head.number<std::uint32_t>("size"),
-           place);
+    const auto size = head.number<std::uint32_t>("size");
+    unpack(head.text("compression"), content_of(*record), size, place);
     chunk_place_ = place;
     return chunk_;
   }

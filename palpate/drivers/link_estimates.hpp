@@ -63,8 +63,8 @@ class SendRate {
  private:
   static constexpr double fastest = 200.0, slowest = 2.0;  // [Hz]
   static constexpr double least_received = 0.85;           // [-] below which a queue overflows
-  static constexpr double most_lateness =
-      0.06;                                // [s] beyond it a queue fills: above Wi-Fi's jitter
+  // [s] beyond it a queue fills: above Wi-Fi's jitter
+  static constexpr double most_lateness = 0.06;
   static constexpr double cut = 0.7;       // [-] what is left of the rate
   static constexpr double growth = 2.0;    // [Hz/s]
   static constexpr double settling = 0.5;  // [s] until a cut shows: a queue's 0.25 s and a way back

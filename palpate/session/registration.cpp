@@ -129,8 +129,8 @@ double spread(std::span<const PointPair> pairs, Vec3 PointPair::*member) {
 
 constexpr double rest_time = 0.5;     // [s] a device without buttons rests for so long
 constexpr double rest_radius = 1e-3;  // [m] within this distance of where the rest began
-constexpr double least_travel =
-    0.01;  // [m] from the last point, or from the start, before the next
+// [m] from the last point, or from the start, before the next
+constexpr double least_travel = 0.01;
 
 }  // namespace
 

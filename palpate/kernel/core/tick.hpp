@@ -110,6 +110,13 @@ struct Tick {
   /// `torque`. What damps or brakes a hand that moves is of no contact. No recording has them: a
   /// replay makes them again.
   std::array<ContactPush, 6> contacts = {};
+
+  /// [m/s] world: what of `surface_motion` a surface of this unit normal shows. Depth shows no more
+  /// of its motion, but a method may follow it along the line of sight: the part beside the normal
+  /// is none, and would drag a hand that sticks.
+  [[nodiscard]] Vec3 surface_motion_along(const Vec3& unit) const noexcept {
+    return surface_motion.dot(unit) * unit;
+  }
 };
 
 /// Can `p` [m] be a place? It is finite and within 1000 km of the origin.

@@ -55,10 +55,8 @@ void Feel::observe(const Observation& seen) noexcept {
   look_whether_to_feel();
 }
 
-// Depth shows no motion of a surface but that along its normal: what is beside the normal of the
-// force is noise, and would drag a hand that sticks.
 Feel::Movement Feel::move(const Tick& tick, const Vec3& normal) noexcept {
-  const Vec3 motion = tick.surface_motion.dot(normal) * normal;
+  const Vec3 motion = tick.surface_motion_along(normal);
   Movement movement;
   if (hand_.started()) {
     movement.dt = tick.t - hand_.t();

@@ -488,24 +488,21 @@ double ShapeTouch::known_share(double t) const noexcept {
 
 // Where the contacts push, and what their materials make of the coupling's force and torque.
 void ShapeTouch::feel(const Pose& hand, Tick& tick) noexcept {
-  // Of a surface's motion: depth shows none but along its normal.
-  const auto along = [&tick](const Vec3& normal) -> Vec3 {
-    return tick.surface_motion.dot(normal) * normal;
-  };
   std::array<ToolFeel::Pushed, 6> pushed;
   Vec3 normals = Vec3::Zero();
   for (std::size_t i = 0; i < held_.count; ++i) {
     const Contact& contact = contacts_[held_.limit[i]];
     const Vec3 force = parameters_.coupling.stiffness * whole_ * pushes_[i];
     normals += force.dot(contact.fit.normal) * contact.fit.normal;
-    pushed[i] = {contact.patch, pose_.at + contact.lever,
-                 contact.lever, contact.fit.normal,
-                 force,         hand_velocity_at(contact.lever) - along(contact.fit.normal)};
+    const Vec3 velocity =
+        hand_velocity_at(contact.lever) - tick.surface_motion_along(contact.fit.normal);
+    pushed[i] = {contact.patch, pose_.at + contact.lever, contact.lever, contact.fit.normal, force,
+                 velocity};
   }
   const std::span contacts(pushed.data(), held_.count);
   if (feel_.feels()) {
     if (normals.norm() > 0.0) tick.normal = normals.normalized();
-    movement_.by = hand.at - last_hand_ - movement_.dt * along(tick.normal);
+    movement_.by = hand.at - last_hand_ - movement_.dt * tick.surface_motion_along(tick.normal);
     feel_.press(contacts, movement_, tick);
   }
   for (const ToolFeel::Pushed& contact : contacts) {

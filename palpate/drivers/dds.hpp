@@ -47,6 +47,7 @@ enum class Generation : std::uint8_t {
 /// What somebody publishes.
 struct Publication {
   std::string topic, type;
+  // NOLINTNEXTLINE(modernize-use-nullptr): a false alarm of clang-tidy 14
   friend auto operator<=>(const Publication&, const Publication&) = default;
 };
 

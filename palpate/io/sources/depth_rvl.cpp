@@ -160,8 +160,8 @@ std::vector<std::byte> encode_depth_rvl(int width, int height,
 
 DepthPng parse_depth_rvl(std::span<const std::byte> bytes, const std::string& name) {
   if (bytes.size() < header) throw Error(name, "ends too early", "it may be damaged");
-  const std::uint32_t width = little_endian<std::uint32_t>(bytes, 0);
-  const std::uint32_t height = little_endian<std::uint32_t>(bytes, 4);
+  const auto width = little_endian<std::uint32_t>(bytes, 0);
+  const auto height = little_endian<std::uint32_t>(bytes, 4);
   const std::size_t count = std::size_t{width} * height;
   if (count == 0 || width > largest_rvl_side || height > largest_rvl_side || count > most_pixels)
     throw Error(name, "promises an image of " + size_text(width, height) + " pixels",

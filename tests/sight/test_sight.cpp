@@ -653,6 +653,8 @@ TEST(Sight, SaysTheSurfacesVelocityAlongItsNormal) {
     tick = live_through(sight, image, t, [](double now) { return Vec3(0, 0, speed * now - 0.01); });
   }
   EXPECT_NEAR(tick.surface_velocity, speed / std::hypot(1.0, slope), 0.01 * speed);
+  // What would carry a hand that sticks, or a fixture, aside is no motion that depth shows.
+  EXPECT_LT((tick.surface_motion - tick.surface_velocity * tick.normal).norm(), 0.02 * speed);
 }
 
 TEST(Sight, LeavesNothingOfAnOldForceOnAHandThatHasLeft) {

@@ -793,7 +793,9 @@ TEST(ShapeTouch, IsCarriedByASurfaceThatRises) {
   EXPECT_NEAR(damped_part(Scene({rising}), 1.5, hand).force.z(), 0.0, 0.05);
   Stage stage(Scene({rising}));
   stage.run(1.0, [](double) { return pose({0, 0, 0.02}); });
-  EXPECT_NEAR(stage.run(1.5, hand).surface_velocity, 0.05, 5e-3);
+  const Tick tick = stage.run(1.5, hand);
+  EXPECT_NEAR(tick.surface_velocity, 0.05, 5e-3);
+  EXPECT_LT((tick.surface_motion - tick.surface_velocity * tick.normal).norm(), 1e-12);
 }
 
 // Hazard: tool-pushes, not-a-number

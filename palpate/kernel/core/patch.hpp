@@ -16,6 +16,9 @@ namespace palpate {
 
 using Vec3 = Eigen::Vector3d;
 
+/// The part of `v` that is along a unit vector.
+inline Vec3 along(const Vec3& v, const Vec3& unit) noexcept { return v.dot(unit) * unit; }
+
 inline Float3 narrow(const Vec3& v) noexcept {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }

@@ -90,8 +90,8 @@ struct Tick {
   ContactState state = ContactState::free_motion;     ///< after the tick's steps
   int steps = 0;                                      ///< proxy steps taken
   double surface_velocity = 0.0;                      ///< [m/s] v of (13), towards the proxy
-  /// [m/s] world: of the surface at the proxy since the tick before, as tracked; corrections of the
-  /// estimate by a frame are no motion
+  /// [m/s] world: of the surface at the proxy since the tick before, as tracked, along its normal:
+  /// depth shows no more of it. Corrections of the estimate by a frame are no motion.
   Vec3 surface_motion = Vec3::Zero();
   /// [N] world: the part of `force` that is an impact's ringing, which the safety chain limits by
   /// itself
@@ -110,13 +110,6 @@ struct Tick {
   /// `torque`. What damps or brakes a hand that moves is of no contact. No recording has them: a
   /// replay makes them again.
   std::array<ContactPush, 6> contacts = {};
-
-  /// [m/s] world: what of `surface_motion` a surface of this unit normal shows. Depth shows no more
-  /// of its motion, but a method may follow it along the line of sight: the part beside the normal
-  /// is none, and would drag a hand that sticks.
-  [[nodiscard]] Vec3 surface_motion_along(const Vec3& unit) const noexcept {
-    return surface_motion.dot(unit) * unit;
-  }
 };
 
 /// Can `p` [m] be a place? It is finite and within 1000 km of the origin.

@@ -56,7 +56,7 @@ void Feel::observe(const Observation& seen) noexcept {
 }
 
 Feel::Movement Feel::move(const Tick& tick, const Vec3& normal) noexcept {
-  const Vec3 motion = tick.surface_motion_along(normal);
+  const Vec3 motion = along(tick.surface_motion, normal);
   Movement movement;
   if (hand_.started()) {
     movement.dt = tick.t - hand_.t();

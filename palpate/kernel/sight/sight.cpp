@@ -377,8 +377,12 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
                                          .return_speed = parameters_.sight.return_speed,
                                          .r_c = parameters_.proxy.r_c()},
                                         parameters_.coupling);
-  tick.surface_velocity = tracker.tracking() ? tracker.surface().normal_velocity() : 0.0;
-  tick.surface_motion = surface_velocity(t);
+  if (tracker.tracking()) {
+    const SurfaceEstimate& surface = tracker.surface();
+    tick.surface_velocity = surface.normal_velocity();
+    tick.surface_motion =
+        along(surface_velocity(t), tick.normal.isZero() ? surface.normal() : tick.normal);
+  }
   return tick;
 }
 

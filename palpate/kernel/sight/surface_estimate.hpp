@@ -84,7 +84,11 @@ class SurfaceEstimate {
   [[nodiscard]] SurfaceContact contact(const Vec3& point, double t, double reach) const noexcept;
   /// [m/s] along `up`.
   [[nodiscard]] double velocity() const noexcept { return velocity_; }
-  /// [m/s] along the normal at the centre of the fit.
+  /// [-] unit, world: the normal at the centre of the fit.
+  [[nodiscard]] Vec3 normal() const noexcept {
+    return frame_.direction_in_world(surface_.normal(centre_));
+  }
+  /// [m/s] along that.
   [[nodiscard]] double normal_velocity() const noexcept {
     return velocity_ * surface_.normal(centre_).z();
   }

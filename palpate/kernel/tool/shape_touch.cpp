@@ -487,24 +487,24 @@ double ShapeTouch::known_share(double t) const noexcept {
 }
 
 // Where the contacts push, and what their materials make of the coupling's force and torque.
-void ShapeTouch::feel(const Pose& hand, Tick& tick) noexcept {
+// @param surface  [m/s] world: of the first contact's surface, along its camera's line of sight
+void ShapeTouch::feel(const Pose& hand, double t, const Vec3& surface, Tick& tick) noexcept {
   std::array<ToolFeel::Pushed, 6> pushed;
   Vec3 normals = Vec3::Zero();
   for (std::size_t i = 0; i < held_.count; ++i) {
     const Contact& contact = contacts_[held_.limit[i]];
     const Vec3 force = parameters_.coupling.stiffness * whole_ * pushes_[i];
     normals += force.dot(contact.fit.normal) * contact.fit.normal;
-    const Vec3 velocity =
-        hand_velocity_at(contact.lever) - tick.surface_motion_along(contact.fit.normal);
+    const Vec3 velocity = hand_velocity_at(contact.lever) -
+                          along(seen_[contact.camera].velocity(t), contact.fit.normal);
     pushed[i] = {contact.patch, pose_.at + contact.lever, contact.lever, contact.fit.normal, force,
                  velocity};
   }
   const std::span contacts(pushed.data(), held_.count);
-  if (feel_.feels()) {
-    if (normals.norm() > 0.0) tick.normal = normals.normalized();
-    movement_.by = hand.at - last_hand_ - movement_.dt * tick.surface_motion_along(tick.normal);
-    feel_.press(contacts, movement_, tick);
-  }
+  if (feel_.feels() && normals.norm() > 0.0) tick.normal = normals.normalized();
+  tick.surface_motion = along(surface, tick.normal);
+  movement_.by = hand.at - last_hand_ - movement_.dt * tick.surface_motion;
+  feel_.press(contacts, movement_, tick);
   for (const ToolFeel::Pushed& contact : contacts) {
     const Eigen::Vector3f lever = contact.lever.cast<float>();
     std::uint32_t at = 0;  // one for all sides of a contact's cone of friction
@@ -522,7 +522,6 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   const Vec3 turn = rotation_vector(between(pose_.turn, hand.turn));
   const Vec3 surface =
       held_.count > 0 ? seen_[contacts_[held_.limit[0]].camera].velocity(t) : Vec3(Vec3::Zero());
-  tick.surface_motion = surface;
   // Each pushes harder while the hand goes deeper, and never pulls.
   const auto push = [&](const Vec3& way, const Vec3& velocity, double stiffness, double damping) {
     const double size = way.norm();
@@ -535,7 +534,7 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
       push(turn, spin_, coupling.stiffness * length * length, coupling.damping * length * length);
   if (const double size = tick.force.norm(); size > undirected_force)
     tick.normal = tick.force / size;
-  feel(hand, tick);
+  feel(hand, t, surface, tick);
   const double share = known_share(t);
   if (share <= 0.0) {
     push_nothing(tick);

@@ -92,7 +92,7 @@ class ShapeTouch final : public Method {
   void add_friction(std::size_t number, const Motion6& wanted, Limits& limits) noexcept;
   [[nodiscard]] Vec3 motion_at(const Motion6& motion, const Contact& contact) const noexcept;
   [[nodiscard]] Vec3 hand_velocity_at(const Vec3& lever) const noexcept;
-  void feel(const Pose& hand, Tick& tick) noexcept;
+  void feel(const Pose& hand, double t, const Vec3& surface, Tick& tick) noexcept;
   [[nodiscard]] double known_share(double t) const noexcept;
   void render(const Pose& hand, double t, Tick& tick) noexcept;
   void release(const Pose& hand) noexcept;

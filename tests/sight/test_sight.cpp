@@ -729,6 +729,40 @@ TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
   EXPECT_NEAR(tick.force.z(), 6.0, 0.3);
 }
 
+TEST(Sight, RestsOnACanNarrowerThanItsDiscs) {
+  // A can of 54 mm before pixels 12.5 mm wide: each disc also shows the table, 40 mm lower, and the
+  // fit through both falls far below the table beside it, which is no occluder for that.
+  const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 39.5, .cy = 29.5};
+  const auto rays = std::make_shared<ViewingRays>(k);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  pose.translation() = Vec3(0, 0, 0.75);
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, 3e-3);
+  const auto shoot = [&] {
+    std::vector<std::uint16_t> depth;
+    for (int v = 0; v < k.height; ++v) {
+      for (int u = 0; u < k.width; ++u) {
+        const bool is_can = 0.75 * rays->ray(u, v).norm() <= 0.027;
+        depth.push_back(static_cast<std::uint16_t>(((is_can ? 0.75 : 0.79) + noise(random)) * 1e4));
+      }
+    }
+    return DepthImage(rays, std::move(depth), 1e4, pose);
+  };
+  Sight sight = seated({0, 0, 0.05});
+  std::vector<DepthImage> images;  // as long as the frames are in use
+  images.reserve(60);
+  double mean = 0.0;  // [m] over the last second
+  for (int frame = 0; frame < 60; ++frame) {
+    images.push_back(shoot());
+    const Tick tick = live_through(sight, images.back(), frame * interval, [](double t) {
+      return Vec3(0, 0, std::max(0.05 - 0.1 * t, -0.01));
+    });
+    if (frame >= 30) mean += tick.proxy.z() / 30.0;
+  }
+  EXPECT_NEAR(mean, r_c, 3e-3);
+}
+
 TEST(Sight, FeelsASmallBoxFromItsFirstFramesOn) {
   // A box of 50 x 60 mm, 1.36 m before a slow camera that looks down at 33 degrees from the
   // vertical. Wide discs see its side and the table, 30 mm lower; the noise is still unknown.

@@ -71,6 +71,22 @@ std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> h
   return size;
 }
 
+// What is above a surface and above the plane that touches it at `foot` [m, local] may hide it. A
+// fit alone says little of what is far off: a small body's falls far below what it stands on.
+class Cover {
+ public:
+  Cover(const Quadric& surface, const Vec2& foot) noexcept : surface_(surface), plane_(Quadric{}) {
+    const Vec2 g = surface.gradient(foot);
+    plane_.c.head<3>() = Vec3(surface.height(foot) - g.dot(foot), g.x(), g.y()).cast<float>();
+  }
+  [[nodiscard]] float above(float x, float y, float z) const noexcept {
+    return z - std::max(surface_.height(x, y), plane_.height(x, y));
+  }
+
+ private:
+  FloatQuadric surface_, plane_;
+};
+
 }  // namespace
 
 std::optional<Layer> first_layer(std::span<float> heights, double gap,
@@ -196,8 +212,10 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
   const auto widening = static_cast<float>((inner.radius_at(far) - inner.radius_at(0.0)) / far);
   const Eigen::Vector3f towards = sighting.line.cast<float>();
   const FloatQuadric surface(expected.surface);
+  const Cover cover(expected.surface, expected.foot);
   const std::size_t size = std::min(patch_.size(), wide_beam_points);
   std::array<float, wide_beam_points> above_surface;
+  std::array<float, wide_beam_points> covers;
   std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
   std::array<float, wide_beam_points> height;
   for (std::size_t i = 0; i < size; ++i) {
@@ -209,6 +227,7 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
     off_axis[i] = x * x + y * y + z * z - along * along - r * r;
     height[i] = x * towards.x() + y * towards.y() + z * towards.z();
     above_surface[i] = points_.z[i] - surface.height(points_.x[i], points_.y[i]);
+    covers[i] = cover.above(points_.x[i], points_.y[i], points_.z[i]);
   }
   std::size_t near = 0;
   std::array<float, wide_beam_points + 1> near_above;
@@ -217,7 +236,7 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
   const auto farthest = static_cast<float>(-reach(surface_));
   for (std::size_t i = 0; i < size; ++i) {
     const float above = above_surface[i];
-    sighting.before += above > gate ? 1 : 0;
+    sighting.before += covers[i] > gate ? 1 : 0;
     const bool counts = (off_axis[i] <= 0.0F) & (above <= nearest) & (above >= farthest);
     const bool is_near = counts & (std::abs(above) <= gate);
     near_above[near] = above;
@@ -266,11 +285,11 @@ void SightTracker::outline(View& view, const Sighting& sighting, const Expectati
 // How many points of an image lie before the expected surface, of those looked at.
 std::size_t SightTracker::covering(const Cloud& cloud, const Expectation& expected) noexcept {
   gather_wide_beam(cloud, expected.place);
-  const FloatQuadric surface(expected.surface);
+  const Cover cover(expected.surface, expected.foot);
   const auto gate = static_cast<float>(expected.gate);
   std::size_t count = 0;
   for (std::size_t i = 0; i < points_.size; ++i)
-    count += points_.z[i] - surface.height(points_.x[i], points_.y[i]) > gate ? 1 : 0;
+    count += cover.above(points_.x[i], points_.y[i], points_.z[i]) > gate ? 1 : 0;
   return count;
 }
 

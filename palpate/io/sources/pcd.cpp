@@ -66,8 +66,8 @@ std::optional<std::string_view> value_of(const Cursor& file, const PcdHeader& he
   return entry->second.front();
 }
 
-std::optional<std::uint64_t> count_of(const Cursor& file, const PcdHeader& header,
-                                      std::string_view keyword) {
+std::optional<std::size_t> count_of(const Cursor& file, const PcdHeader& header,
+                                    std::string_view keyword) {
   const auto value = value_of(file, header, keyword);
   if (!value) return std::nullopt;
   const auto count = detail::to_count(*value);
@@ -117,15 +117,14 @@ std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header, Poin
 
   std::vector<Column> columns;
   for (std::size_t i = 0; i < size; ++i) {
-    constexpr std::uint64_t largest_count = 1'000'000;  // keeps all products below in 64 bits
+    constexpr std::size_t largest_count = 1'000'000;  // keeps all products below in 64 bits
     const auto count = detail::to_count(counts[i]);
     if (!count || *count == 0 || *count > largest_count)
       file.fail(
           "COUNT " + detail::quoted(counts[i]) + " is not in 1.." + std::to_string(largest_count),
           correct_header);
     const Scalar* type = type_of(file, types[i], sizes[i]);
-    columns.push_back(
-        {.name = fields->second[i], .type = type, .count = static_cast<std::size_t>(*count)});
+    columns.push_back({.name = fields->second[i], .type = type, .count = *count});
     cloud.fields.push_back(
         {std::string(columns.back().name), std::string(type->name), columns.back().count});
   }
@@ -216,7 +215,7 @@ void read_compressed(Cursor& file, const std::vector<Column>& columns, std::size
     const auto bytes_in_point = [&](const Column& column) {
       return column.name == "_" && !has_padding ? 0 : column.bytes();
     };
-    std::size_t of_point = 0;
+    std::uint64_t of_point = 0;  // [bytes]
     for (const Column& column : columns) of_point += bytes_in_point(column);
     if (data.size() % of_point != 0 || data.size() / of_point != size) continue;
     detail::prepare(columns, size);

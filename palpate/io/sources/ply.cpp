@@ -19,7 +19,7 @@ constexpr const char* correct_line = "correct the line";
 
 struct Element {
   std::string_view name;
-  std::uint64_t rows = 0;
+  std::size_t rows = 0;
   std::vector<Column> properties;
 
   [[nodiscard]] std::string text() const { return "element " + detail::quoted(name); }

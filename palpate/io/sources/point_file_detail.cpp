@@ -150,8 +150,8 @@ std::vector<double> to_numbers(std::string list, std::size_t count) {
   return numbers.size() == count ? numbers : std::vector<double>{};
 }
 
-std::optional<std::uint64_t> to_count(std::string_view token) noexcept {
-  return number_in<std::uint64_t>(token);
+std::optional<std::size_t> to_count(std::string_view token) noexcept {
+  return number_in<std::size_t>(token);
 }
 
 std::string quoted(std::string_view piece) {
@@ -232,7 +232,9 @@ void prepare(std::span<const Column> columns, std::size_t rows) {
 
 void read_rows(Cursor& file, std::span<const Column> columns, std::size_t rows, Order order,
                const std::string& noun) {
-  std::size_t least = 0;  // [bytes] of a row; in text a digit and what separates it
+  // [bytes] of a row; in text a digit and what separates it. No sum of columns overflows 64 bits,
+  // which a browser's std::size_t does not have.
+  std::uint64_t least = 0;
   bool has_lists = false;
   for (const Column& column : columns) {
     least += order ? column.bytes() : 2 * column.count;
@@ -247,9 +249,10 @@ void read_rows(Cursor& file, std::span<const Column> columns, std::size_t rows, 
                         cut_short);
   prepare(columns, rows);
   if (order && !has_lists) {
-    const std::byte* first = file.take(rows * least);
+    const auto stride = static_cast<std::size_t>(least);
+    const std::byte* first = file.take(rows * stride);
     for (const Column& column : columns) {
-      if (column.put) take_column(column, first, least, rows, *order);
+      if (column.put) take_column(column, first, stride, rows, *order);
       first += column.bytes();
     }
     return;

@@ -80,7 +80,7 @@ const Scalar* find_scalar(const Is& is) {
 [[nodiscard]] std::optional<double> to_number(std::string_view token) noexcept;
 /// The numbers of a list by blanks, commas and brackets; empty unless they are `count` finite ones.
 [[nodiscard]] std::vector<double> to_numbers(std::string list, std::size_t count);
-[[nodiscard]] std::optional<std::uint64_t> to_count(std::string_view token) noexcept;
+[[nodiscard]] std::optional<std::size_t> to_count(std::string_view token) noexcept;
 
 /// A piece of a file as a message can show it: in quotes, printable and short.
 [[nodiscard]] std::string quoted(std::string_view piece);

@@ -3,7 +3,7 @@ import "./style.css";
 import { Brush, dabColour } from "./brush";
 import { Connection, unknownToken } from "./connection";
 import type { Presence } from "./dispatch";
-import { get, write as writeIn } from "./dom";
+import { get, say, write } from "./dom";
 import { Files } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
 import { stickOf } from "./gamepad";
@@ -107,14 +107,14 @@ function switchFelt(): void {
 const connection = new Connection({
   opened() {
     get("connection").dataset.state = "live";
-    get("connection").textContent = "connected";
+    write("connection", "connected");
     get("toast").hidden = true;
   },
   lost(refusal) {
     arrived.clear();
     hand.letGo();
     get("connection").dataset.state = "lost";
-    get("connection").textContent = refusal ? "refused" : "reconnecting";
+    write("connection", refusal ? "refused" : "reconnecting");
     toast(
       refusal ?? "The connection to the program is lost. The hand is released; trying again.",
       0,
@@ -188,17 +188,15 @@ const connection = new Connection({
     };
     chip.textContent = texts[owner] + (viewers > 1 ? ` · ${viewers} viewers` : "");
   },
-  moreHands(hands) {
+  more_hands(hands) {
     view.showHands(hands, handsLines(hands));
-    write("more-hands", handsText(hands));
-    get("more-hands").hidden = false;
+    say("more-hands", handsText(hands));
   },
   robot(robot) {
     view.showRobot(robot.tool, robot.radius, robot.links, robotLines(robot));
-    write("robot", robotText(robot));
-    get("robot").hidden = false;
+    say("robot", robotText(robot));
   },
-  refused(reason) {
+  error(reason) {
     toast(reason);
     panel.refused();
   },
@@ -263,10 +261,6 @@ function share(): void {
     () => toast("The link to this view is copied."),
     () => toast("The link to this view is the page's address."),
   );
-}
-
-function write(id: string, text: string): void {
-  writeIn(get(id), text);
 }
 
 // All that is said of the force comes from one tick, and changes at once.

@@ -211,9 +211,10 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   return message;
 }
 
-ViewerMessage text_message(const std::string& text) {
+ViewerMessage text_message(const nlohmann::json& words) {
   ViewerMessage message;
   message.text = true;
+  const std::string text = words.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   const auto bytes = std::as_bytes(std::span(text));
   message.head.assign(bytes.begin(), bytes.end());
   return message;

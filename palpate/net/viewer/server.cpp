@@ -33,6 +33,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using asio::ip::tcp;
+using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 using SharedMessage = std::shared_ptr<const ViewerMessage>;
@@ -106,11 +107,8 @@ std::string source_of(const tcp::socket& socket) {
   return asio::ip::make_address_v6(bytes).to_string();
 }
 
-// A JSON object with another member in front.
-std::string with_member(const std::string& object, std::string_view name, std::string_view text) {
-  std::string made = "{\"" + std::string(name) + "\":\"" + std::string(text) + "\"";
-  if (object.size() > 2) made += ",";
-  return made + object.substr(1);
+SharedMessage shared_text(const json& words) {
+  return std::make_shared<const ViewerMessage>(text_message(words));
 }
 
 // One of a limited number of places, taken from the request on until the page has gone.
@@ -180,10 +178,7 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   }
   void may_explain_again() { explained_ = false; }
 
-  void refuse(std::string_view why) {
-    send(std::make_shared<const ViewerMessage>(text_message(nlohmann::json{{"error", why}}.dump(
-        -1, ' ', false, nlohmann::json::error_handler_t::replace))));
-  }
+  void refuse(std::string_view why) { send(shared_text(json{{"error", why}})); }
 
   // What belongs to a camera; its newest frame takes the place of one that has not been sent yet.
   void show(std::size_t camera, const SharedMessage& message) {
@@ -387,11 +382,11 @@ class ViewerServer::Impl final : public Hub {
   void joined(const std::shared_ptr<PageSession>& page) override {
     pages_.push_back(page);
     viewers_ = pages_.size();
-    std::string hello = with_member(host_.hello(), "role", to_string(role_of(*page)));
-    if (page->admission().needs_token)
-      hello = with_member(hello, "operator_token", operator_token_);
-    if (page->admission().unknown_token) hello = with_member(hello, "token", "unknown");
-    page->send(shared_text("{\"hello\":" + hello + "}"));
+    json hello = host_.hello();
+    hello["role"] = to_string(role_of(*page));
+    if (page->admission().needs_token) hello["operator_token"] = operator_token_;
+    if (page->admission().unknown_token) hello["token"] = "unknown";
+    page->send(shared_text(json{{"hello", std::move(hello)}}));
     send_state({page});
     for (std::size_t camera = 0; camera < cameras_.size(); ++camera)
       for (const auto& [kind, message] : cameras_[camera]) page->show(camera, message);
@@ -531,10 +526,10 @@ class ViewerServer::Impl final : public Hub {
       for (const auto& page : pages_) page->send(message);
     };
     if (batch) tell(std::make_shared<const ViewerMessage>(ticks_message(*batch)));
-    if (const std::string robot = host_.robot(); !robot.empty())
-      tell(shared_text("{\"robot\":" + robot + "}"));
-    if (const std::string hands = host_.more_hands(); !hands.empty())
-      tell(shared_text("{\"more_hands\":" + hands + "}"));
+    if (const json robot = host_.robot(); !robot.is_null())
+      tell(shared_text(json{{"robot", robot}}));
+    if (const json hands = host_.more_hands(); !hands.is_null())
+      tell(shared_text(json{{"more_hands", hands}}));
     if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 
@@ -550,8 +545,8 @@ class ViewerServer::Impl final : public Hub {
       const char* hand = hand_owner_ == nullptr      ? "free"
                          : hand_owner_ == page.get() ? "you"
                                                      : "other";
-      const nlohmann::json presence = {{"hand", hand}, {"viewers", pages_.size()}};
-      page->send(shared_text(nlohmann::json{{"presence", presence}}.dump()));
+      const json presence = {{"hand", hand}, {"viewers", pages_.size()}};
+      page->send(shared_text(json{{"presence", presence}}));
       if (hand_changed) page->may_explain_again();
     }
     if (hand_changed) send_state(pages_);
@@ -560,13 +555,13 @@ class ViewerServer::Impl final : public Hub {
   // The state with each page's role; one message for all of a role.
   void send_state(const std::vector<std::shared_ptr<PageSession>>& pages) {
     if (pages.empty()) return;
-    const std::string state = host_.state();
+    json words = {{"state", host_.state()}};
     std::map<Role, SharedMessage> messages;
     for (const auto& page : pages) {
       const Role role = role_of(*page);
       SharedMessage& message = messages[role];
-      if (!message)
-        message = shared_text("{\"state\":" + with_member(state, "role", to_string(role)) + "}");
+      words["state"]["role"] = to_string(role);
+      if (!message) message = shared_text(words);
       page->send(message);
     }
   }
@@ -585,10 +580,6 @@ class ViewerServer::Impl final : public Hub {
         for (const auto& page : pages_) page->show(i, message);
       }
     }
-  }
-
-  static SharedMessage shared_text(const std::string& text) {
-    return std::make_shared<const ViewerMessage>(text_message(text));
   }
 
   using Seconds = std::chrono::duration<double>;

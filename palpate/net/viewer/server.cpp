@@ -112,15 +112,12 @@ SharedMessage shared_text(const json& words) {
 }
 
 // One of a limited number of places, taken from the request on until the page has gone.
-struct GiveBack {
-  void operator()(int* taken) const { --*taken; }
-};
-using Place = std::unique_ptr<int, GiveBack>;
+using Place = std::shared_ptr<int>;
 
 Place take_place(int& taken, int most) {
   if (taken >= most) return nullptr;
   ++taken;
-  return Place(&taken);
+  return {&taken, [](int* count) { --*count; }};
 }
 
 // With what a page comes in.
@@ -717,7 +714,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
                             });
   }
 
-  void answer(const Request& request) {
+  void answer(Request request) {
     Admission admission = server_.judge(request, source_);
     if (admission.status == http::status::ok && websocket::is_upgrade(request)) {
       std::make_shared<PageSession>(server_, std::move(stream_), std::move(admission))
@@ -727,50 +724,20 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     http::status status = admission.status;
     if (status == http::status::ok) {
       const std::string_view path = path_of(request);
-      if (path == "/splat" && give_splat(request)) return;
+      if (path == "/splat" && request.method() == http::verb::get) {
+        splat_ = server_.host_.gaussians();
+        const std::string_view bytes(reinterpret_cast<const char*>(splat_.data()),
+                                     splat_.size() * sizeof(splat_.front()));
+        if (!bytes.empty()) {
+          request.keep_alive(false);
+          return write(request, status, "application/octet-stream", bytes);
+        }
+      }
       for (const PageFile& file : page_files())
         if (file.path == path) return write(request, status, file.type, file.content);
       status = http::status::not_found;
     }
     write(request, status, "text/plain; charset=utf-8", explanation(status));
-  }
-
-  // What pages draw of the splat that is felt. @return whether there is one
-  bool give_splat(const Request& request) {
-    if (request.method() == http::verb::head) return false;
-    splat_ = server_.host_.gaussians();
-    if (splat_.empty()) return false;
-    Response& response = response_.emplace(http::status::ok, request.version());
-    set_head(response, "application/octet-stream");
-    response.keep_alive(false);
-    response.body() = {reinterpret_cast<const char*>(splat_.data()),
-                       splat_.size() * sizeof(splat_.front())};
-    response.prepare_payload();
-    serializer_.emplace(response);
-    give_more();
-    return true;
-  }
-
-  // As much as the connection takes, for which there is time again each time.
-  void give_more() {
-    stream_.expires_after(answer_timeout);
-    http::async_write_some(stream_, *serializer_,
-                           [self = shared_from_this()](beast::error_code error, std::size_t) {
-                             if (error) return;
-                             if (!self->serializer_->is_done()) return self->give_more();
-                             self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
-                           });
-  }
-
-  static void set_head(Response& response, std::string_view type) {
-    response.set(http::field::content_type, {type.data(), type.size()});
-    response.set(http::field::cache_control, "no-store");
-    response.set("Content-Security-Policy",
-                 "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
-                 "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
-    response.set("X-Content-Type-Options", "nosniff");
-    response.set("Referrer-Policy", "no-referrer");  // the address holds the token
-    response.set("Cross-Origin-Resource-Policy", "same-origin");
   }
 
   static std::string_view explanation(http::status status) {
@@ -794,22 +761,42 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
 
   void write(const Request& request, http::status status, std::string_view type,
              std::string_view content) {
-    response_.emplace(status, request.version());
-    Response& response = *response_;
-    set_head(response, type);
+    Response& response = response_.emplace(status, request.version());
+    response.set(http::field::content_type, {type.data(), type.size()});
+    response.set(http::field::cache_control, "no-store");
+    response.set("Content-Security-Policy",
+                 "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
+                 "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set("X-Content-Type-Options", "nosniff");
+    response.set("Referrer-Policy", "no-referrer");  // the address holds the token
+    response.set("Cross-Origin-Resource-Policy", "same-origin");
     response.keep_alive(request.keep_alive());
     response.content_length(content.size());
     if (request.method() != http::verb::head) response.body() = {content.data(), content.size()};
+    serializer_.emplace(response);
     stream_.expires_after(answer_timeout);
-    http::async_write(stream_, response,
-                      [self = shared_from_this()](beast::error_code error, std::size_t) {
-                        if (self->file_parser_ && self->response_->result() == http::status::ok)
-                          self->end_file(true);
-                        if (error) return;
-                        if (self->response_->keep_alive()) return self->read();
-                        self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
-                        if (self->drains_) self->drain();
-                      });
+    write_more();
+  }
+
+  // As much as the connection takes. A splat may be large: there is time again for each part.
+  void write_more() {
+    http::async_write_some(stream_, *serializer_,
+                           [self = shared_from_this()](beast::error_code error, std::size_t) {
+                             if (!error && !self->serializer_->is_done()) {
+                               if (!self->splat_.empty())
+                                 self->stream_.expires_after(answer_timeout);
+                               return self->write_more();
+                             }
+                             self->written(error);
+                           });
+  }
+
+  void written(beast::error_code error) {
+    if (file_parser_ && response_->result() == http::status::ok) end_file(true);
+    if (error) return;
+    if (response_->keep_alive()) return read();
+    stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+    if (drains_) drain();
   }
 
   Impl& server_;

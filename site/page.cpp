@@ -411,13 +411,8 @@ EMSCRIPTEN_KEEPALIVE const double* palpate_tick() {
   static std::array<double, 14> numbers;
   if (!page().scene) return numbers.data();
   const palpate::ServoTick& tick = page().scene->tick();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto axis = static_cast<int>(i);
-    numbers[i] = tick.tick.hip[axis];
-    numbers[3 + i] = tick.tick.proxy[axis];
-    numbers[6 + i] = tick.tick.normal[axis];
-    numbers[9 + i] = tick.force[axis];
-  }
+  Eigen::Map<Eigen::Matrix<double, 3, 4>>(numbers.data()) << tick.tick.hip, tick.tick.proxy,
+      tick.tick.normal, tick.force;
   numbers[12] = static_cast<double>(tick.tick.state);
   numbers[13] = tick.tick.t;
   return numbers.data();

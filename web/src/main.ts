@@ -248,10 +248,6 @@ function goToMoment({ cameras, playback }: State): void {
   ask({ play: { ...playback, paused: true } });
   asked.frame = null;
 }
-function goToView(): void {
-  if (asked.orbit && view.frames > 0) view.setOrbit(asked.orbit);
-  if (view.frames > 0) asked.orbit = null;
-}
 function share(): void {
   const frame = state?.playback ? (longest(state.cameras)?.place ?? null) : null;
   const link = linkTo(location.href, view.orbit, frame);
@@ -308,7 +304,10 @@ function loop(now: number): void {
     connection.send(encodeShown(camera, frame.number));
   }
   arrived.clear();
-  if (asked.orbit) goToView();
+  if (asked.orbit && view.frames > 0) {
+    view.setOrbit(asked.orbit);
+    asked.orbit = null;
+  }
   const stick = document.hidden ? null : stickOf(navigator.getGamepads?.() ?? []);
   if (stick) hand.steer(stick, Math.min(now - looped, LONGEST_STEP) / 1000);
   looped = now;

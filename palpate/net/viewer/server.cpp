@@ -741,22 +741,16 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   }
 
   static std::string_view explanation(http::status status) {
-    switch (status) {
-      case http::status::method_not_allowed:
-        return "Only GET and HEAD are answered.\n";
-      case http::status::forbidden:
-        return "Not from this host or origin.\n";
-      case http::status::unauthorized:
-        return "The token is missing or wrong.\n";
-      case http::status::conflict:
-        return "Another file is being sent.\n";
-      case http::status::too_many_requests:
-        return "Too many wrong tokens came from this address; wait five minutes.\n";
-      case http::status::service_unavailable:
-        return "Too many pages are open.\n";
-      default:
-        return "There is no such page.\n";
-    }
+    static const std::map<http::status, std::string_view> texts = {
+        {http::status::method_not_allowed, "Only GET and HEAD are answered.\n"},
+        {http::status::forbidden, "Not from this host or origin.\n"},
+        {http::status::unauthorized, "The token is missing or wrong.\n"},
+        {http::status::conflict, "Another file is being sent.\n"},
+        {http::status::too_many_requests,
+         "Too many wrong tokens came from this address; wait five minutes.\n"},
+        {http::status::service_unavailable, "Too many pages are open.\n"}};
+    const auto found = texts.find(status);
+    return found == texts.end() ? "There is no such page.\n" : found->second;
   }
 
   void write(const Request& request, http::status status, std::string_view type,

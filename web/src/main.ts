@@ -4,7 +4,7 @@ import { Brush, dabColour } from "./brush";
 import { Connection, unknownToken } from "./connection";
 import type { Presence } from "./dispatch";
 import { get, say, write } from "./dom";
-import { Files } from "./files";
+import { takeFiles } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
 import { stickOf } from "./gamepad";
 import { HandInput, isForForm } from "./hand";
@@ -175,7 +175,7 @@ const connection = new Connection({
     record.title = mayOperate(newest)
       ? about
       : `${path ? `Recording ${path}. ` : ""}Only the operator's page starts and ends recordings.`;
-    record.setAttribute("aria-pressed", String(newest.recording.path !== null));
+    record.setAttribute("aria-pressed", String(path !== null));
   },
   presence({ hand: owner, viewers }) {
     whose = owner;
@@ -217,7 +217,7 @@ const connection = new Connection({
   },
 });
 
-new Files({
+takeFiles({
   send: (file, name) => connection.sendFile(file, name, toast),
   toast,
   hello: () => introduced,

@@ -65,6 +65,32 @@ static void to_json(json& shown, const Dab& dab) {
            {"material", dab.material}};
 }
 
+static void to_json(json& shown, const FixtureSet::Item& item) {
+  const Fixture& fixture = item.fixture;
+  json pose = json::array();  // row by row
+  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
+  Vec3 size = fixture.size;
+  json points = json::array();
+  if (fixture.shape == FixtureShape::mesh) {  // its box
+    Eigen::AlignedBox3d box;
+    for (const Vec3& point : fixture.points) box.extend(point);
+    size = box.sizes();
+    const Vec3 middle = fixture.world_from_fixture * box.center();
+    for (int axis = 0; axis < 3; ++axis)
+      pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
+  } else {
+    points = fixture.points;
+  }
+  shown = {{"name", fixture.name},
+           {"kind", fixture_kind_names()[static_cast<std::size_t>(fixture.kind)]},
+           {"shape", fixture_shape_names()[static_cast<std::size_t>(fixture.shape)]},
+           {"pose", pose},
+           {"size", size},
+           {"radius", fixture.radius},
+           {"length", fixture.length},
+           {"points", points}};
+}
+
 namespace {
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
@@ -121,31 +147,6 @@ std::vector<float> path_of(const std::string& uri) {
 std::string_view stricter_text(std::string_view limit) {
   constexpr std::array<std::string_view, 3> names{"lower", "higher", ""};
   return names[static_cast<std::size_t>(stricter_direction(limit))];
-}
-
-json fixture_to_draw(const Fixture& fixture) {
-  json pose = json::array();  // row by row
-  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
-  Vec3 size = fixture.size;
-  json points = json::array();
-  if (fixture.shape == FixtureShape::mesh) {  // its box
-    Eigen::AlignedBox3d box;
-    for (const Vec3& point : fixture.points) box.extend(point);
-    size = box.sizes();
-    const Vec3 middle = fixture.world_from_fixture * box.center();
-    for (int axis = 0; axis < 3; ++axis)
-      pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
-  } else {
-    points = fixture.points;
-  }
-  return {{"name", fixture.name},
-          {"kind", fixture_kind_names()[static_cast<std::size_t>(fixture.kind)]},
-          {"shape", fixture_shape_names()[static_cast<std::size_t>(fixture.shape)]},
-          {"pose", pose},
-          {"size", size},
-          {"radius", fixture.radius},
-          {"length", fixture.length},
-          {"points", points}};
 }
 
 namespace fs = std::filesystem;
@@ -353,10 +354,7 @@ json SessionHost::state() {
     if ((first.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
   }
   json fixtures = json::array();
-  if (state.settings.fixtures) {
-    for (const FixtureSet::Item& item : state.settings.fixtures->items())
-      fixtures.push_back(fixture_to_draw(item.fixture));
-  }
+  if (state.settings.fixtures) fixtures = state.settings.fixtures->items();
   json brush;
   if (brush_) brush = {{"material", brush_->material}, {"radius", brush_->radius}};
   const DeviceInfo& device = session_->device().info();

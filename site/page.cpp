@@ -74,17 +74,14 @@ void post(const ViewerMessage& message) {
              message.payload.size(), colour.data(), colour.size());
 }
 
-void post(std::string_view verb, const std::string& what) {
-  post_text(("{\"" + std::string(verb) + "\":" + what + "}").c_str());
+void post(std::string_view verb, const nlohmann::json& what) {
+  post(text_message(nlohmann::json{{verb, what}}));
 }
 
-void refuse(const std::string& why) {
-  post("error", nlohmann::json(why).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-}
-
-// A JSON object with the one role that there is here.
-std::string with_role(const std::string& object) {
-  return "{\"role\":\"" + std::string(to_string(Role::operating)) + "\"," + object.substr(1);
+// With the one role that there is here.
+void post_as_operator(std::string_view verb, nlohmann::json what) {
+  what["role"] = to_string(Role::operating);
+  post(verb, what);
 }
 
 // Frames wait here until the page has drawn those before.
@@ -154,7 +151,7 @@ class Scene {
         session_(options_of(uri)),
         server_({}, host_) {
     host_.attach(session_);
-    post("hello", with_role(host_.hello()));
+    post_as_operator("hello", host_.hello());
     tell_presence();
     host_.show_on(&server_);
   }
@@ -245,8 +242,7 @@ class Scene {
   void replay_recording() {
     const std::string uri = session_.state().cameras.front().uri;
     SessionReader reader(Uri(uri).path());
-    const ReplayReport report = replay(reader);
-    post("notice", nlohmann::json(text_of(report)).dump());
+    post("notice", text_of(replay(reader)));
   }
 
   void release(const HandMessage& farewell) {
@@ -255,12 +251,12 @@ class Scene {
     tell_presence();
   }
   void tell_presence() {
-    post("presence", holds_ ? R"({"hand":"you","viewers":1})" : R"({"hand":"free","viewers":1})");
+    post("presence", {{"hand", holds_ ? "you" : "free"}, {"viewers", 1}});
     tell_state();
   }
   void tell_state() {
     host_.look_at_recordings();
-    post("state", with_role(host_.state()));
+    post_as_operator("state", host_.state());
     const RecordingState recording = session_.state().recording;
     if (recording.on || recording.failed || recording.folder == offered_) return;
     offered_ = recording.folder;
@@ -300,7 +296,7 @@ bool tried(const Do& act) {
     act();
     return true;
   } catch (const std::exception& error) {
-    refuse(error.what());
+    post("error", error.what());
     return false;
   }
 }
@@ -415,13 +411,8 @@ EMSCRIPTEN_KEEPALIVE const double* palpate_tick() {
   static std::array<double, 14> numbers;
   if (!page().scene) return numbers.data();
   const palpate::ServoTick& tick = page().scene->tick();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto axis = static_cast<int>(i);
-    numbers[i] = tick.tick.hip[axis];
-    numbers[3 + i] = tick.tick.proxy[axis];
-    numbers[6 + i] = tick.tick.normal[axis];
-    numbers[9 + i] = tick.force[axis];
-  }
+  Eigen::Map<Eigen::Matrix<double, 3, 4>>(numbers.data()) << tick.tick.hip, tick.tick.proxy,
+      tick.tick.normal, tick.force;
   numbers[12] = static_cast<double>(tick.tick.state);
   numbers[13] = tick.tick.t;
   return numbers.data();

@@ -28,8 +28,10 @@ namespace test_server {
 // Remembers what pages asked of it.
 class FakeHost final : public ViewerHost {
  public:
-  std::string hello() override { return R"({"version":"test"})"; }
-  std::string state() override { return R"({"method":"paper"})"; }
+  nlohmann::json hello() override { return {{"version", "test"}}; }
+  nlohmann::json state() override { return {{"method", "paper"}}; }
+  nlohmann::json robot() override { return {}; }
+  nlohmann::json more_hands() override { return {}; }
   std::optional<TickBatch> ticks() override {
     waits_ = true;
     const std::lock_guard gate(gate_);

@@ -47,7 +47,7 @@ struct Hosted {
   Hosted(const Hosted&) = delete;
   Hosted& operator=(const Hosted&) = delete;
 
-  json state() { return json::parse(host.state()); }
+  json state() { return host.state(); }
   auto asking(const Command& command, Role role) {
     return [this, command, role] { host.command(command, role); };
   }
@@ -57,18 +57,18 @@ struct Hosted {
 };
 
 TEST(SessionHost, ShowsTheRobotThatTheHandLeads) {
-  EXPECT_EQ(Hosted().host.robot(), "");
+  EXPECT_TRUE(Hosted().host.robot().is_null());
   RobotPicture picture{.name = "arm", .latency = 0.12};
   PageRules rules;
   rules.robot = [&] { return std::optional(picture); };
   Hosted hosted(std::move(rules));
-  json shown = json::parse(hosted.host.robot());
+  json shown = hosted.host.robot();
   EXPECT_TRUE(shown["tool"].is_null());
   EXPECT_EQ(shown["latency"], 0.12);
   picture.tool = Vec3(0.1, 0.2, 0.3);
   picture.links = {Vec3::Zero(), *picture.tool};
   picture.trouble = "its brakes are on";
-  shown = json::parse(hosted.host.robot());
+  shown = hosted.host.robot();
   EXPECT_EQ(shown["tool"], (json{0.1, 0.2, 0.3}));
   EXPECT_EQ(shown["links"].size(), 2U);
   EXPECT_EQ(shown["trouble"], "its brakes are on");
@@ -120,7 +120,7 @@ TEST(SessionHost, OpensNoSceneButThoseThatItLists) {
   std::vector<std::string> opened;
   Hosted hosted({.scenes = {{"synthetic:desk", "a desk"}},
                  .open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
-  EXPECT_EQ(json::parse(hosted.host.hello())["scenes"][0]["uri"], "synthetic:desk");
+  EXPECT_EQ(hosted.host.hello()["scenes"][0]["uri"], "synthetic:desk");
   EXPECT_TRUE(fails_saying(hosted.asking(OpenScene{"pcd:/etc/secret.pcd"}, Role::operating),
                            "/etc/secret.pcd", "not among"));
   EXPECT_TRUE(opened.empty());
@@ -147,9 +147,9 @@ TEST(SessionHost, ProposesTheLengthOfWhatIsTooLargeAndOpensItOnceItIsWanted) {
     SessionHost host("1.2.3", rules);
     Session session(std::move(options));
     host.attach(session);
-    EXPECT_TRUE(json::parse(host.state())["points"].is_null()) << "nothing was seen yet";
+    EXPECT_TRUE(host.state()["points"].is_null()) << "nothing was seen yet";
     session.run(0.01);
-    json state = json::parse(host.state())["points"];
+    json state = host.state()["points"];
     if (state["rescaled"] != "") host.command(OpenScene{state["rescaled"]}, Role::operating);
     host.detach();
     return state;
@@ -180,7 +180,7 @@ TEST(SessionHost, GivesTheSplatThatIsFeltAndOpensItAtTheScaleThatWasMeasured) {
   SessionHost host("1.2.3", {.open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
   Session session(std::move(options));
   host.attach(session);
-  EXPECT_EQ(json::parse(host.hello())["splat"], true);
+  EXPECT_EQ(host.hello()["splat"], true);
   const auto drawn = host.gaussians();
   ASSERT_EQ(drawn.size(), 100U);
   // World from file: (x, y, z) to (1 - z / 100, 2 + y / 100, 3 + x / 100).
@@ -203,7 +203,7 @@ TEST(SessionHost, GivesTheSplatThatIsFeltAndOpensItAtTheScaleThatWasMeasured) {
   host.detach();
 
   Hosted wall({.open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
-  EXPECT_EQ(json::parse(wall.host.hello())["splat"], false);
+  EXPECT_EQ(wall.host.hello()["splat"], false);
   EXPECT_TRUE(wall.host.gaussians().empty());
   EXPECT_TRUE(fails_saying(wall.asking(Rescale{0.5}, Role::operating), "scale", "--camera"));
   EXPECT_EQ(opened.size(), 1U);
@@ -214,7 +214,7 @@ TEST(SessionHost, OpensAFileThatArrivedInFull) {
   const auto files = std::make_shared<DroppedFiles>(1000);
   Hosted hosted(
       {.open_scene = [&](const std::string& uri) { opened.push_back(uri); }, .files = files});
-  EXPECT_EQ(json::parse(hosted.host.hello())["file_limit"], 1000);
+  EXPECT_EQ(hosted.host.hello()["file_limit"], 1000);
   const std::filesystem::path half = hosted.host.begin_file("half.ply", 900);
   std::ofstream(half) << "ply";
   EXPECT_TRUE(fails_saying([&] { return hosted.host.begin_file("more.ply", 200); }, "more.ply",
@@ -247,7 +247,7 @@ TEST(SessionHost, HoldsTheOperatorToTheSessionsOptions) {
 
 TEST(SessionHost, SaysInWhichDirectionLimitsAreStricter) {
   Hosted hosted;
-  const json hello = json::parse(hosted.host.hello());
+  const json hello = hosted.host.hello();
   for (const json& row : hello["safety"]) {
     if (row["name"] == "max_device_force") {
       EXPECT_EQ(row["stricter"], "lower");
@@ -284,7 +284,7 @@ TEST(SessionHost, TellsALatchedFaultUntilTheOperatorResetsIt) {
   host.attach(session);
   std::vector<json> latched_by;
   session.run(0.4, [&](const ServoTick& tick) {
-    if (tick.number % 120 == 119) latched_by.push_back(json::parse(host.state())["latched_by"]);
+    if (tick.number % 120 == 119) latched_by.push_back(host.state()["latched_by"]);
     if (tick.number == 300) host.command(ResetFaults{}, Role::operating);
   });
   host.detach();
@@ -298,7 +298,7 @@ TEST(SessionHost, SaysThatTheForceIsOnHold) {
   host.attach(session);
   std::vector<json> on_hold;
   session.run(0.3, [&](const ServoTick& tick) {
-    if (tick.number % 100 == 99) on_hold.push_back(json::parse(host.state())["on_hold"]);
+    if (tick.number % 100 == 99) on_hold.push_back(host.state()["on_hold"]);
     if (tick.number == 100 || tick.number == 200) session.hold(tick.number == 100);
   });
   host.detach();
@@ -326,7 +326,7 @@ TEST(SessionHost, WarnsOfAStiffnessThatTheDeviceIsNotGoodFor) {
   Session session(std::move(options));
   SessionHost host("1.2.3");
   host.attach(session);
-  const auto warnings = [&] { return json::parse(host.state())["device"]["warnings"]; };
+  const auto warnings = [&] { return host.state()["device"]["warnings"]; };
   host.command(SetParameter{"stiffness", 460.0}, Role::operating);
   EXPECT_EQ(warnings(), json::array()) << "2 * 0.7 / (1 ms + 2 * 1 ms) = 466.7 N/m at 1 kHz";
   host.command(SetParameter{"stiffness", 480.0}, Role::operating);
@@ -386,7 +386,7 @@ TEST(SessionHost, GivesTheHandAnotherToolThatItsPageTurns) {
     return hosted.state()["tool"];
   };
   EXPECT_EQ(hosted.state()["tool"], "ball");
-  const json offered = json::parse(hosted.host.hello())["tools"];
+  const json offered = hosted.host.hello()["tools"];
   EXPECT_EQ(choose(offered[1]), "box:40x20x5mm");
   // Tilted about x by 0.2 rad: the edge at +y touches first.
   const Rotation tilted(std::cos(0.1), std::sin(0.1), 0.0, 0.0);
@@ -423,7 +423,7 @@ TEST(SessionHost, OffersTheToolThatTheSessionBeganWith) {
   SessionHost host("1.2.3");
   host.attach(session);
   const auto began = session.settings().tool;
-  EXPECT_EQ(json::parse(host.hello())["tools"].back(), "box:41x20x5mm?points=200");
+  EXPECT_EQ(host.hello()["tools"].back(), "box:41x20x5mm?points=200");
   host.command(SetTool{"ball"}, Role::operating);
   EXPECT_EQ(session.settings().tool, nullptr);
   host.command(SetTool{"box:41x20x5mm?points=200"}, Role::operating);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The brush: what is touched gets another material.
 
-import { clamp } from "./camera_math";
 import { element, get, write } from "./dom";
+import { metres } from "./fixtures";
 import type { Command, State } from "./protocol";
 
 const NONE = "none";
@@ -16,7 +16,7 @@ export function brushOf(
   millimetres: number,
 ): { material: string; radius: number } | null {
   if (choice === NONE) return null;
-  const radius = clamp(Number.isFinite(millimetres) ? millimetres : USUAL_RADIUS, 2, 50) / 1e3;
+  const radius = metres(millimetres, 2, 50, USUAL_RADIUS);
   return { material: choice === ERASER ? "" : choice, radius };
 }
 
@@ -67,6 +67,6 @@ export class Brush {
       this.material.value = paint.brush === null ? NONE : paint.brush.material || ERASER;
     if (document.activeElement !== this.radius && paint.brush)
       this.radius.value = String(1e3 * paint.brush.radius);
-    write(get("brush-about"), paintText(paint));
+    write("brush-about", paintText(paint));
   }
 }

@@ -12,7 +12,14 @@ const POINTS_PER_ROW = 1024;
 const LEAST_POINTS = 2000; // that are drawn of an unorganised cloud, if it has as many
 
 // Here and not in each of a point's pixels, of which software draws millions.
-const SCREEN = /* glsl */ `
+const COLOURS = /* glsl */ `
+uniform vec2 range;            // [m] near and far colour
+uniform vec3 nearColour, middleColour, farColour;
+vec3 ofDepth(float z) {
+  float t = clamp((z - range.x) / (range.y - range.x), 0.0, 1.0);
+  return t < 0.5 ? mix(nearColour, middleColour, 2.0 * t)
+                 : mix(middleColour, farColour, 2.0 * t - 1.0);
+}
 vec3 toLinear(vec3 c) { return pow(c, vec3(2.2)); }
 vec3 toScreen(vec3 c) { return pow(c, vec3(1.0 / 2.2)); }
 `;
@@ -37,8 +44,7 @@ uniform int stride;
 uniform mat4 worldFromCamera;
 uniform float pixelsPerMetre;  // of the screen, at one metre
 uniform float smallest;        // [px]
-uniform vec2 range;            // [m] near and far colour
-uniform vec3 nearColour, middleColour, farColour, glow;
+uniform vec3 glow;
 uniform vec3 proxy;
 uniform vec3 radii;            // r_1, r_3; what the paper's psi falls from and to
 uniform vec3 light;
@@ -51,7 +57,7 @@ uniform mat4 tintFromWorld;
 #endif
 out vec3 colour;
 
-${SCREEN}
+${COLOURS}
 bool pointAt(ivec2 pixel, out vec3 p) {
 #ifdef POINTS
   int i = pixel.y * size.x + pixel.x;
@@ -131,9 +137,7 @@ void main() {
   vec3 world = (worldFromCamera * vec4(p, 1.0)).xyz;
   gl_Position = projectionMatrix * viewMatrix * vec4(world, 1.0);
 
-  float t = clamp((p.z - range.x) / (range.y - range.x), 0.0, 1.0);
-  colour = t < 0.5 ? mix(nearColour, middleColour, 2.0 * t)
-                   : mix(middleColour, farColour, 2.0 * t - 1.0);
+  colour = ofDepth(p.z);
   vec3 own;
   if (tintAt(pixel, world, own)) colour = toLinear(own);
   else colour *= shade(pixel, p);
@@ -154,21 +158,17 @@ void main() {
 const facesVertexShader = /* glsl */ `
 precision highp float;
 uniform mat4 worldFromCamera;
-uniform vec2 range;
-uniform vec3 nearColour, middleColour, farColour;
 uniform bool tinted;
 #ifdef TINT
 in vec3 own;
 #endif
-${SCREEN}
+${COLOURS}
 out vec3 colour;
 out vec3 place;
 void main() {
   place = (worldFromCamera * vec4(position, 1.0)).xyz;
   gl_Position = projectionMatrix * viewMatrix * vec4(place, 1.0);
-  float t = clamp((position.z - range.x) / (range.y - range.x), 0.0, 1.0);
-  colour = t < 0.5 ? mix(nearColour, middleColour, 2.0 * t)
-                   : mix(middleColour, farColour, 2.0 * t - 1.0);
+  colour = ofDepth(position.z);
 #ifdef TINT
   if (tinted) colour = toLinear(own);
 #endif
@@ -197,13 +197,6 @@ void main() {
   fragment = vec4(colour, 1.0);
 }
 `;
-
-function nearest(texture: THREE.DataTexture): THREE.DataTexture {
-  texture.minFilter = THREE.NearestFilter;
-  texture.magFilter = THREE.NearestFilter;
-  texture.generateMipmaps = false;
-  return texture;
-}
 
 /** Uniforms that all cameras share, set before a drawing. */
 export const cloudLook = () => ({
@@ -319,9 +312,7 @@ export class CameraCloud {
     this.lens = message;
     this.rays?.dispose();
     const { rays, width, height } = message;
-    this.rays = nearest(
-      new THREE.DataTexture(rays, width, height, THREE.RGFormat, THREE.FloatType),
-    );
+    this.rays = new THREE.DataTexture(rays, width, height, THREE.RGFormat, THREE.FloatType);
     this.rays.needsUpdate = true;
     this.material.uniforms.rays!.value = this.rays;
   }
@@ -486,9 +477,8 @@ function refilled(
   const { image } = texture ?? {};
   if (image?.width !== width || image.height !== height || texture?.internalFormat !== internal) {
     texture?.dispose();
-    texture = nearest(new THREE.DataTexture(null, width, height, format, type));
+    texture = new THREE.DataTexture(null, width, height, format, type);
     texture.internalFormat = internal;
-    texture.unpackAlignment = 1;
   }
   texture!.image = { data: data as unknown as Uint8Array<ArrayBuffer>, width, height };
   texture!.needsUpdate = true;

@@ -13,21 +13,16 @@ export const unknownToken =
 
 /** Why the program lets no session begin; null: that is not why. @param status  of HTTP */
 export function refusalText(status: number, hasToken: boolean): string | null {
-  switch (status) {
-    case 401:
-      return hasToken
-        ? "The token in this page's address is wrong or of an earlier session. " +
-            "Open the link that the program printed."
-        : "This page's address lacks its token. Open the link that the program printed.";
-    case 403:
-      return "The program does not answer pages of this address. Open the link that it printed.";
-    case 429:
-      return "Too many wrong tokens came from here. Wait five minutes, then open the printed link.";
-    case 503:
-      return "Too many pages are open. Close one of them.";
-    default:
-      return null;
-  }
+  const texts: Record<number, string> = {
+    401: hasToken
+      ? "The token in this page's address is wrong or of an earlier session. " +
+        "Open the link that the program printed."
+      : "This page's address lacks its token. Open the link that the program printed.",
+    403: "The program does not answer pages of this address. Open the link that it printed.",
+    429: "Too many wrong tokens came from here. Wait five minutes, then open the printed link.",
+    503: "Too many pages are open. Close one of them.",
+  };
+  return texts[status] ?? null;
 }
 
 /** The line to the program: opens, notices when it is dead, and opens again. */

@@ -10,18 +10,23 @@ export interface Presence {
   viewers: number;
 }
 
-export interface Handlers {
-  opened(): void;
-  /** @param refusal  why the program lets no session begin; null: it is lost */
-  lost(refusal: string | null): void;
+/** What is said in words, by its verbs. */
+interface Words {
   hello(hello: Hello): void;
   state(state: State): void;
   presence(presence: Presence): void;
   robot(robot: RobotState): void;
-  moreHands(hands: OtherHand[]): void;
-  refused(reason: string): void;
+  more_hands(hands: OtherHand[]): void;
+  /** what the page asked for is refused */
+  error(reason: string): void;
   /** what the person is told */
   notice(text: string): void;
+}
+
+export interface Handlers extends Words {
+  opened(): void;
+  /** @param refusal  why the program lets no session begin; null: it is lost */
+  lost(refusal: string | null): void;
   /** from where the scene is looked at */
   orbit(): Orbit;
   message(message: Message): void;
@@ -32,12 +37,6 @@ export type Toast = (text: string, lasts?: number) => void;
 
 export function dispatch(data: string | ArrayBuffer, handlers: Handlers): void {
   if (typeof data !== "string") return handlers.message(decode(data));
-  const [[verb, what]] = Object.entries(JSON.parse(data)) as [[string, unknown]];
-  if (verb === "hello") handlers.hello(what as Hello);
-  if (verb === "state") handlers.state(what as State);
-  if (verb === "presence") handlers.presence(what as Presence);
-  if (verb === "robot") handlers.robot(what as RobotState);
-  if (verb === "more_hands") handlers.moreHands(what as OtherHand[]);
-  if (verb === "notice") handlers.notice(what as string);
-  if (verb === "error") handlers.refused(what as string);
+  const [[verb, what]] = Object.entries(JSON.parse(data)) as [[keyof Words, never]];
+  handlers[verb]?.(what);
 }

@@ -3,9 +3,16 @@
 
 export const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
-/** Changes a text where it differs: what is the same is not laid out anew. */
-export function write(box: Element, text: string): void {
+/** Changes the text of `at`, by its id, where it differs: the same is not laid out anew. */
+export function write(at: string | Element, text: string): void {
+  const box = typeof at === "string" ? get(at) : at;
   if (box.textContent !== text) box.textContent = text;
+}
+
+/** The same of a part that is there only while there is something to be said. */
+export function say(id: string, text: string): void {
+  write(id, text);
+  get(id).hidden = !text;
 }
 
 export function element<Tag extends keyof HTMLElementTagNameMap>(

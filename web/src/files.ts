@@ -41,37 +41,34 @@ export interface FileActions {
   state(): State | null;
 }
 
-export class Files {
-  constructor(private readonly actions: FileActions) {
-    const input = get<HTMLInputElement>("file");
-    get("open-file").addEventListener("click", () => input.click());
-    input.addEventListener("change", () => {
-      if (input.files?.length) this.send([...input.files]);
-      input.value = ""; // the same file may be chosen again
-    });
-    const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
-    const show = (shown: boolean) => (get("drop").hidden = !shown);
-    addEventListener("dragover", (event) => {
-      if (!hasFiles(event)) return;
-      event.preventDefault();
-      show(true);
-    });
-    addEventListener("dragleave", (event) => event.relatedTarget === null && show(false));
-    addEventListener("drop", (event) => {
-      if (!hasFiles(event)) return;
-      event.preventDefault();
-      show(false);
-      const entries = [...event.dataTransfer!.items].map((item) => item.webkitGetAsEntry?.());
-      if (entries.some((entry) => entry?.isDirectory))
-        this.actions.toast("A folder cannot be dropped. Start the program with --camera.");
-      else this.send([...event.dataTransfer!.files]);
-    });
-  }
-
-  private send(files: readonly File[]): void {
-    const refusal = whyNotSent(files, this.actions.hello(), this.actions.state());
-    if (refusal) return this.actions.toast(refusal);
-    const file = files[0]!;
-    this.actions.send(file, plainName(file.name));
-  }
+/** Listens to what is dropped or chosen. */
+export function takeFiles(actions: FileActions): void {
+  const send = (files: readonly File[]): void => {
+    const refusal = whyNotSent(files, actions.hello(), actions.state());
+    if (refusal) return actions.toast(refusal);
+    actions.send(files[0]!, plainName(files[0]!.name));
+  };
+  const input = get<HTMLInputElement>("file");
+  get("open-file").addEventListener("click", () => input.click());
+  input.addEventListener("change", () => {
+    if (input.files?.length) send([...input.files]);
+    input.value = ""; // the same file may be chosen again
+  });
+  const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+  const show = (shown: boolean) => (get("drop").hidden = !shown);
+  addEventListener("dragover", (event) => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    show(true);
+  });
+  addEventListener("dragleave", (event) => event.relatedTarget === null && show(false));
+  addEventListener("drop", (event) => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    show(false);
+    const entries = [...event.dataTransfer!.items].map((item) => item.webkitGetAsEntry?.());
+    if (entries.some((entry) => entry?.isDirectory))
+      actions.toast("A folder cannot be dropped. Start the program with --camera.");
+    else send([...event.dataTransfer!.files]);
+  });
 }

@@ -77,8 +77,8 @@ export function fixtureLines(fixture: FixtureState): number[] {
   ]);
 }
 
-// Of what a field holds in mm.
-function metres(x: number, low: number, high: number, usual: number): number {
+/** Of what a field holds in mm. */
+export function metres(x: number, low: number, high: number, usual: number): number {
   return clamp(Number.isFinite(x) ? x : usual, low, high) / 1e3;
 }
 

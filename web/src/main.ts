@@ -3,8 +3,8 @@ import "./style.css";
 import { Brush, dabColour } from "./brush";
 import { Connection, unknownToken } from "./connection";
 import type { Presence } from "./dispatch";
-import { get, write as writeIn } from "./dom";
-import { Files } from "./files";
+import { get, say, write } from "./dom";
+import { takeFiles } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
 import { stickOf } from "./gamepad";
 import { HandInput, isForForm } from "./hand";
@@ -107,14 +107,14 @@ function switchFelt(): void {
 const connection = new Connection({
   opened() {
     get("connection").dataset.state = "live";
-    get("connection").textContent = "connected";
+    write("connection", "connected");
     get("toast").hidden = true;
   },
   lost(refusal) {
     arrived.clear();
     hand.letGo();
     get("connection").dataset.state = "lost";
-    get("connection").textContent = refusal ? "refused" : "reconnecting";
+    write("connection", refusal ? "refused" : "reconnecting");
     toast(
       refusal ?? "The connection to the program is lost. The hand is released; trying again.",
       0,
@@ -175,7 +175,7 @@ const connection = new Connection({
     record.title = mayOperate(newest)
       ? about
       : `${path ? `Recording ${path}. ` : ""}Only the operator's page starts and ends recordings.`;
-    record.setAttribute("aria-pressed", String(newest.recording.path !== null));
+    record.setAttribute("aria-pressed", String(path !== null));
   },
   presence({ hand: owner, viewers }) {
     whose = owner;
@@ -188,17 +188,15 @@ const connection = new Connection({
     };
     chip.textContent = texts[owner] + (viewers > 1 ? ` · ${viewers} viewers` : "");
   },
-  moreHands(hands) {
+  more_hands(hands) {
     view.showHands(hands, handsLines(hands));
-    write("more-hands", handsText(hands));
-    get("more-hands").hidden = false;
+    say("more-hands", handsText(hands));
   },
   robot(robot) {
     view.showRobot(robot.tool, robot.radius, robot.links, robotLines(robot));
-    write("robot", robotText(robot));
-    get("robot").hidden = false;
+    say("robot", robotText(robot));
   },
-  refused(reason) {
+  error(reason) {
     toast(reason);
     panel.refused();
   },
@@ -219,7 +217,7 @@ const connection = new Connection({
   },
 });
 
-new Files({
+takeFiles({
   send: (file, name) => connection.sendFile(file, name, toast),
   toast,
   hello: () => introduced,
@@ -250,10 +248,6 @@ function goToMoment({ cameras, playback }: State): void {
   ask({ play: { ...playback, paused: true } });
   asked.frame = null;
 }
-function goToView(): void {
-  if (asked.orbit && view.frames > 0) view.setOrbit(asked.orbit);
-  if (view.frames > 0) asked.orbit = null;
-}
 function share(): void {
   const frame = state?.playback ? (longest(state.cameras)?.place ?? null) : null;
   const link = linkTo(location.href, view.orbit, frame);
@@ -263,10 +257,6 @@ function share(): void {
     () => toast("The link to this view is copied."),
     () => toast("The link to this view is the page's address."),
   );
-}
-
-function write(id: string, text: string): void {
-  writeIn(get(id), text);
 }
 
 // All that is said of the force comes from one tick, and changes at once.
@@ -314,7 +304,10 @@ function loop(now: number): void {
     connection.send(encodeShown(camera, frame.number));
   }
   arrived.clear();
-  if (asked.orbit) goToView();
+  if (asked.orbit && view.frames > 0) {
+    view.setOrbit(asked.orbit);
+    asked.orbit = null;
+  }
   const stick = document.hidden ? null : stickOf(navigator.getGamepads?.() ?? []);
   if (stick) hand.steer(stick, Math.min(now - looped, LONGEST_STEP) / 1000);
   looped = now;

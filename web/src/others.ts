@@ -2,7 +2,7 @@
 // The hands beside the first, and a robot that is led: what is said of them, and their lines.
 
 import { add, length, scale } from "./camera_math";
-import type { OtherHand, RobotState, Vec3 } from "./protocol";
+import type { OtherHand, RobotState } from "./protocol";
 
 const ARROW = 0.02; // [m] of a line for each N
 const SILENCE = 0.5; // [s] after which what was heard last is old
@@ -38,9 +38,9 @@ export function handsText(hands: readonly OtherHand[]): string {
 
 /** From each HIP to its proxy, and the force there: the lines' ends, x y z after one another. */
 export function handsLines(hands: readonly OtherHand[]): number[] {
-  const lines = hands.flatMap(({ hip, proxy, force }): [Vec3, Vec3][] => {
-    const pulled: [Vec3, Vec3] = [hip, proxy];
-    return length(force) > 0 ? [pulled, [proxy, add(proxy, scale(force, ARROW))]] : [pulled];
-  });
-  return lines.flatMap(([from, to]) => [...from, ...to]);
+  return hands.flatMap(({ hip, proxy, force }) => [
+    ...hip,
+    ...proxy,
+    ...robotLines({ tool: proxy, force }),
+  ]);
 }

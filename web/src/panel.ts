@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Method, parameters, safety and session: what the program says of itself, and what can be set.
 
-import { element, get, write } from "./dom";
+import { element, get, say, write } from "./dom";
 import type { Command, Hello, ParameterRow, Role, State } from "./protocol";
 
 /** What a page is called, and what it may do. */
@@ -389,10 +389,8 @@ export class Panel {
     if (document.activeElement !== this.tool) this.tool.value = state.tool;
     if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
     const method = this.hello?.methods.find(({ name }) => name === state.method);
-    write(get("method-meaning"), method?.meaning ?? "");
-    const warning = get("stiffness-warning");
-    write(warning, warningText(state.device.warnings));
-    warning.hidden = !warning.textContent;
+    write("method-meaning", method?.meaning ?? "");
+    say("stiffness-warning", warningText(state.device.warnings));
     for (const [table, rows] of Object.entries(this.rows))
       for (const row of rows) row.show(state[table as Table][row.row.name] ?? Number.NaN);
     this.showRole(state.role);
@@ -405,7 +403,7 @@ export class Panel {
     count("interventions", state.interventions);
     const total = state.interventions.reduce((sum, n) => sum + n, 0);
     write(
-      get("safety-lead"),
+      "safety-lead",
       `${total.toLocaleString("en")} interventions of the safety chain; suspected pop-throughs: ` +
         `${state.pop_throughs}.`,
     );
@@ -421,11 +419,7 @@ export class Panel {
     for (const row of this.rows.parameters) row.allow(role !== "looking");
     for (const row of this.rows.safety) row.allow(maySetLimit(role, row.row));
     for (const row of this.rows.placement) row.allow(role === "operating");
-    for (const [part, why] of Object.entries(whyNot(role))) {
-      const text = get(`${part}-why`);
-      text.textContent = why;
-      text.hidden = !why;
-    }
+    for (const [part, why] of Object.entries(whyNot(role))) say(`${part}-why`, why);
   }
 
   /** Clock and size in the record button while it records; the way into the recording after. */

@@ -57,7 +57,7 @@ export class Ruler {
     get("ruler").hidden = places === null;
     for (const id of ["ruler-length", "ruler-apply"]) get(id).hidden = !b;
     write(
-      get("ruler-text"),
+      "ruler-text",
       a && b
         ? `These are ${lengthText(length(sub(a, b)))} apart at this scale. In truth:`
         : `Press on ${a ? "the other" : "two places whose distance you know: on the first"}.`,

@@ -14,7 +14,7 @@ import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import { nearestAbout, type Place } from "./pointers";
 import type { Contact, Frame, OtherHand, Rays, Ticks, Tool, Vec3 } from "./protocol";
 import { SplatCloud } from "./splat";
-import type { Spot } from "./surface";
+import type { SeenSurface, Spot } from "./surface";
 import { SOFTWARE_LEVEL, Thinning } from "./thinning";
 
 const ARROW_PER_NEWTON = 0.055; // of the view's height
@@ -94,10 +94,18 @@ const FAR_AWAY: Vec3 = [0, 0, 1e6]; // a proxy that is not known: nothing glows
 const NO_CONTACT: Contact = { at: [0, 0, 0], push: [0, 0, 0] };
 const NO_TOOL: Tool = { kind: "tool", points: new Float32Array(), triangles: new Uint32Array() };
 
-type Ball = THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
+// A body that is lit: a ball, unless it has a shape of its own.
+type Body = THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
+function body(
+  look: THREE.MeshStandardMaterialParameters,
+  shape: THREE.BufferGeometry = BALL,
+): Body {
+  return new THREE.Mesh(shape, new THREE.MeshStandardMaterial(look));
+}
 
-function ball(look: THREE.MeshStandardMaterialParameters): Ball {
-  return new THREE.Mesh(BALL, new THREE.MeshStandardMaterial(look));
+// A flat mark, which is seen from both sides and through what is before it.
+function flat(shape: THREE.BufferGeometry, look: THREE.MeshBasicMaterialParameters) {
+  return new THREE.Mesh(shape, new THREE.MeshBasicMaterial({ ...FLAT, ...look }));
 }
 
 function line(look: THREE.LineBasicMaterialParameters) {
@@ -127,6 +135,12 @@ function turningArrow(material: THREE.Material): THREE.Group {
   return new THREE.Group().add(...[arc, point].map((part) => new THREE.Mesh(part, material)));
 }
 
+// Of some, the one of which there is the least; null: there are none.
+function leastOf<One>(all: readonly One[], measure: (one: One) => number): One | null {
+  const lesser = (a: One | null, b: One) => (a && measure(a) <= measure(b) ? a : b);
+  return all.reduce(lesser, null);
+}
+
 function isSoftwareRenderer(gl: WebGL2RenderingContext): boolean {
   const info = gl.getExtension("WEBGL_debug_renderer_info");
   const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
@@ -150,7 +164,7 @@ export class SceneView {
   private readonly clouds = new Map<number, CameraCloud>();
   private readonly felt = new THREE.Group(); // all that is drawn of them
   private splat: SplatCloud | null = null;
-  private readonly proxy = ball({ roughness: 0.35 });
+  private readonly proxy = body({ roughness: 0.35 });
   private readonly ring = new THREE.Sprite(
     new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
   );
@@ -162,14 +176,8 @@ export class SceneView {
   );
   private readonly ruler = line({ depthTest: false });
   private readonly trail = line({ transparent: true, opacity: 0.7 });
-  private readonly shadow = new THREE.Mesh(
-    new THREE.CircleGeometry(1, 40),
-    new THREE.MeshBasicMaterial({ ...FLAT, color: 0x000000, opacity: 0.45 }),
-  );
-  private readonly spot = new THREE.Mesh(
-    new THREE.RingGeometry(0.8, 1, 40),
-    new THREE.MeshBasicMaterial({ ...FLAT, opacity: 0.9 }),
-  );
+  private readonly shadow = flat(new THREE.CircleGeometry(1, 40), { color: 0, opacity: 0.45 });
+  private readonly spot = flat(new THREE.RingGeometry(0.8, 1, 40), { opacity: 0.9 });
   private readonly grid = segments(0.16);
   // Each with its name; those that give a force in another colour.
   private readonly fixtures = new THREE.Group();
@@ -182,7 +190,7 @@ export class SceneView {
     MOST_DABS,
   );
   // The robot that the hand leads.
-  private readonly tool = ball({ roughness: 0.4 });
+  private readonly tool = body({ roughness: 0.4 });
   private readonly arm = new THREE.InstancedMesh(
     rod(1, 12),
     new THREE.MeshStandardMaterial({ roughness: 0.6 }),
@@ -190,24 +198,21 @@ export class SceneView {
   );
   private readonly push = segments(1);
   // The hands beside the first: proxies and HIPs in turn.
-  private readonly otherBalls: Ball[] = [];
+  private readonly otherBalls: Body[] = [];
   private readonly otherLines = segments(1);
   private fixturesDrawn = "";
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
   // The hand that was recorded, which presses into the surface.
-  private readonly ghost = ball({ ...HIDDEN_TOO, opacity: 0.6, roughness: 0.8 });
+  private readonly ghost = body({ ...HIDDEN_TOO, opacity: 0.6, roughness: 0.8 });
   private readonly ghostTrail = line({ ...HIDDEN_TOO, opacity: 0.6 });
-  private readonly pin = new THREE.Mesh(
-    rod(0.09, 12),
-    new THREE.MeshStandardMaterial({ roughness: 0.6 }),
-  );
+  private readonly pin = body({ roughness: 0.6 }, rod(0.09, 12));
   private readonly arrowMaterial = new THREE.MeshStandardMaterial({ roughness: 0.5 });
   private readonly arrow = arrow(this.arrowMaterial);
   // The tool in the hand, if it has a shape: held off by surfaces, and as the hand holds it.
-  private readonly heldTool = new THREE.Mesh(
+  private readonly heldTool = body(
+    { flatShading: true, roughness: 0.5 },
     new THREE.BufferGeometry(),
-    new THREE.MeshStandardMaterial({ flatShading: true, roughness: 0.5 }),
   );
   private readonly handTool = new THREE.Mesh(
     this.heldTool.geometry,
@@ -382,7 +387,7 @@ export class SceneView {
   /** The hands beside the first, and their lines. */
   showHands(hands: readonly OtherHand[], ends: readonly number[]): void {
     while (this.otherBalls.length < 2 * hands.length) {
-      this.otherBalls.push(ball({ roughness: 0.35 }));
+      this.otherBalls.push(body({ roughness: 0.35 }));
       this.scene.add(this.otherBalls.at(-1)!);
     }
     hands.forEach(({ hip, proxy, touches }, i) => {
@@ -454,9 +459,8 @@ export class SceneView {
 
   /** The view that the newest frames ask for. */
   resetView(): void {
-    const clouds = [...this.clouds.values()];
-    const seen = this.splat ? [this.splat.seen] : clouds.flatMap((cloud) => cloud.seen ?? []);
-    const pose = clouds.find(({ frame }) => frame)?.frame?.worldFromCamera;
+    const seen = this.splat ? [this.splat.seen] : this.surfaces;
+    const pose = this.shown[0]?.worldFromCamera;
     const home = pose && firstView(seen, pose, this.room, this.splat !== null);
     if (!home) return;
     this.home = home;
@@ -538,8 +542,7 @@ export class SceneView {
 
   /** Is the world the camera's own frame, as no pose is known? */
   get inOwnFrame(): boolean {
-    const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
-    return frames.some((frame) => frame.worldFromCamera.every((x, i) => x === +(i % 5 === 0)));
+    return this.shown.some((frame) => frame.worldFromCamera.every((x, i) => x === +(i % 5 === 0)));
   }
 
   /** Draws the cameras' own colours, where they have any, or those of depth. */
@@ -587,19 +590,15 @@ export class SceneView {
     const box = this.canvas.getBoundingClientRect();
     if (x < box.left || y < box.top || x >= box.right || y >= box.bottom) return null;
     const { from, along } = this.rayUnder(x, y);
-    let best: { spot: Spot; distance: number } | null = null;
-    for (const { seen } of this.clouds.values()) {
-      const met = seen?.meet(from, along);
-      if (met && (!best || met.distance < best.distance)) best = met;
-    }
-    return (best ?? this.splat?.seen.meet(from, along))?.spot ?? null;
+    const met = this.surfaces.flatMap((seen) => seen.meet(from, along) ?? []);
+    const nearest = leastOf(met, ({ distance }) => distance);
+    return (nearest ?? this.splat?.seen.meet(from, along))?.spot ?? null;
   }
 
   /** The same, and where; in a hole of a camera's image, the nearest surface about it. */
   surfaceNear(at: Place): { at: Place; spot: Spot } | null {
     // Points without an image are met from some way beside them, and looking at many takes long.
-    const hasImage =
-      !this.splat && [...this.clouds.values()].some(({ seen }) => seen?.unordered === 0);
+    const hasImage = !this.splat && this.surfaces.some(({ unordered }) => unordered === 0);
     const near = nearestAbout(at, (place) =>
       place === at || hasImage ? this.spotUnder(place.x, place.y) : null,
     );
@@ -621,7 +620,6 @@ export class SceneView {
 
   /** How far a place is before what a camera sees, along the nearest sightline; see Ahead. */
   ahead(place: Vec3): { distance: number; towards: Vec3 } | null {
-    let best: { distance: number; towards: Vec3 } | null = null;
     if (this.splat) {
       // What is felt is a window about the hand: what is in between is seen from the eye alone.
       const from = eye(this.orbit);
@@ -629,28 +627,24 @@ export class SceneView {
       const reach = this.splat.seen.firstPoint(from, scale(towards, -1));
       return reach === null ? null : { distance: reach - length(sub(place, from)), towards };
     }
-    for (const { seen } of this.clouds.values()) {
-      const hit = seen?.onSightline(place);
-      if (!hit) continue;
-      const towards = unit(sub(seen!.eye, hit));
-      const distance = dot(sub(place, hit), towards);
-      if (!best || Math.abs(distance) < Math.abs(best.distance)) best = { distance, towards };
-    }
-    return best;
+    const sightlines = this.surfaces.flatMap((seen) => {
+      const hit = seen.onSightline(place);
+      if (!hit) return [];
+      const towards = unit(sub(seen.eye, hit));
+      return { distance: dot(sub(place, hit), towards), towards };
+    });
+    return leastOf(sightlines, ({ distance }) => Math.abs(distance));
   }
 
   /** The surface on a camera's sightline through a place, whether that is before it or behind. */
   spotAt(place: Vec3): Spot | null {
     const seen = this.ahead(place);
     if (!seen) return null;
-    let best: Spot | null = null;
-    for (const cloud of this.clouds.values()) {
-      // From before the surface.
-      const before = add(place, scale(seen.towards, Math.max(0, 0.02 - seen.distance)));
-      const spot = cloud.seen?.meet(before, scale(seen.towards, -1))?.spot;
-      if (spot && (!best || length(sub(spot.at, place)) < length(sub(best.at, place)))) best = spot;
-    }
-    return best;
+    // From before the surface.
+    const before = add(place, scale(seen.towards, Math.max(0, 0.02 - seen.distance)));
+    const along = scale(seen.towards, -1);
+    const spots = this.surfaces.flatMap((surface) => surface.meet(before, along)?.spot ?? []);
+    return leastOf(spots, ({ at }) => length(sub(at, place)));
   }
 
   depthRange(): [number, number] | null {
@@ -709,6 +703,14 @@ export class SceneView {
     return true;
   }
 
+  // The cameras' newest frames, and what they measured.
+  private get shown(): Frame[] {
+    return [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
+  }
+  private get surfaces(): SeenSurface[] {
+    return [...this.clouds.values()].flatMap(({ seen }) => seen ?? []);
+  }
+
   private cloudOf(camera: number): CameraCloud {
     let cloud = this.clouds.get(camera);
     if (!cloud) {
@@ -743,8 +745,7 @@ export class SceneView {
 
   // Once: from what is seen at first. A moving camera's frustum moves with it.
   private placeCameras(): void {
-    const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
-    this.setLine(this.frusta, frames.flatMap(cameraLines));
+    this.setLine(this.frusta, this.shown.flatMap(cameraLines));
     if (this.grid.visible || !this.home) return;
     const first = this.splat ?? this.clouds.values().next().value!;
     const floor = floorUnder(first.seen?.places(2000) ?? [], this.orbit.up);

@@ -104,7 +104,7 @@ export class Timeline {
     this.place.max = String(recording.frames - 1);
     this.place.value = String(recording.place);
     this.place.setAttribute("aria-valuetext", timeText(recording.time));
-    write(get("place-text"), timeText(recording.time));
+    write("place-text", timeText(recording.time));
   }
 
   private set(change: Partial<Playback>): void {

@@ -64,10 +64,10 @@ const touches = ({ state }: Tick) => state !== 0;
 const newtons = (value: number, digits = 1) => `${value.toFixed(digits)} N`;
 const millimetres = (metres: number) => (1e3 * metres).toFixed(metres < 0.01 ? 1 : 0);
 
-// Is the force that is sent less than what is asked for, so that somebody could notice?
-const falls = (tick: Tick) => tick.askedForce - sent(tick) > Math.max(0.02, 0.05 * tick.askedForce);
-const changes = (tick: Tick) =>
-  Math.abs(tick.askedForce - sent(tick)) > Math.max(0.02, 0.05 * tick.askedForce);
+// Is the force that is sent another than what is asked for, so that somebody could notice, or less?
+const changes = ({ askedForce, force }: Tick) =>
+  Math.abs(askedForce - length(force)) > Math.max(0.02, 0.05 * askedForce);
+const falls = (tick: Tick) => tick.askedForce > sent(tick) && changes(tick);
 
 function fixtures({ tick, acting }: Parameters<Say>[0]): string {
   if (Math.max(tick.region, tick.guidance) < LEAST_FORCE) return "";
@@ -79,6 +79,12 @@ function asked(facts: Parameters<Say>[0]): string {
   const askers = [touches(tick) ? "the surface" : "", fixtures(facts)].filter(Boolean);
   return `${askers.join(" and ") || "the method"} asked for ${newtons(tick.askedForce)}.`;
 }
+
+// Of a limit that makes the force that is sent less than what is asked for.
+const limited =
+  (how: string): Say =>
+  (facts) =>
+    falls(facts.tick) ? `${how}; ${asked(facts)}` : "";
 
 // Why no force is sent, in the order in which they decide. Empty: this does not say why.
 const NONE: readonly [flag: string, say: Say][] = [
@@ -110,19 +116,9 @@ const LESS: readonly [flag: string, say: Say][] = [
   ["frame_late", () => "It may only fall, as a camera's next frame is overdue."],
   ["energy_cut", () => "Softened, as the surface kept up an oscillation."],
   ["oscillation_cut", () => "Softened, as the force swung fast, again and again."],
-  [
-    "continuous_cut",
-    (facts) => (falls(facts.tick) ? `Limited, as the motors are warm; ${asked(facts)}` : ""),
-  ],
-  [
-    "scale_unsure",
-    (facts) =>
-      falls(facts.tick) ? `Limited, as the scale of the depth is in doubt; ${asked(facts)}` : "",
-  ],
-  [
-    "force_cut",
-    (facts) => (falls(facts.tick) ? `Limited to what is allowed; ${asked(facts)}` : ""),
-  ],
+  ["continuous_cut", limited("Limited, as the motors are warm")],
+  ["scale_unsure", limited("Limited, as the scale of the depth is in doubt")],
+  ["force_cut", limited("Limited to what is allowed")],
   ["force_saturated", ({ tick }) => (touches(tick) ? "Limited by the method's max force." : "")],
   [
     "pull_removed",

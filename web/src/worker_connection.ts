@@ -101,7 +101,7 @@ export class Connection {
       button.setAttribute("aria-pressed", String(ending !== null));
     };
     const refuse = ({ message }: Error) =>
-      this.handlers.refused(`the camera of this device: ${message}; allow it for this page`);
+      this.handlers.error(`the camera of this device: ${message}; allow it for this page`);
     button.addEventListener("click", () => {
       if (end) return end();
       const give = (depth: DepthFrame) => this.worker.postMessage({ depth });
@@ -139,7 +139,7 @@ export class Connection {
       const name = new URL(url, location.href).pathname.split("/").pop() || "file";
       this.give(name.replace(/[^A-Za-z0-9._-]+/g, "_"), await answer.arrayBuffer());
     } catch (error) {
-      this.handlers.refused(
+      this.handlers.error(
         `${url}: it cannot be fetched: ${(error as Error).message}; ` +
           "its host must allow other pages to read it (CORS)",
       );

@@ -31,11 +31,6 @@ enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
 // Whose pixels colours are: nobody's, those of the depth or the points, another camera's.
 enum class Colours : std::uint8_t { none = 0, registered = 1, own_camera = 2 };
 
-constexpr std::size_t frame_header_size = 96;
-constexpr std::size_t colour_header_size = 72;
-constexpr std::size_t ticks_header_size = 160;
-constexpr std::size_t contact_size = 24;
-constexpr std::size_t sample_size = 28;
 constexpr std::size_t hand_size = 32;
 constexpr std::size_t turned_hand_size = 64;  // with an orientation
 constexpr std::size_t shown_size = 8;
@@ -78,7 +73,6 @@ ViewerMessage frame_message(const FrameHeader& header, Format format,
                             std::span<const std::byte> payload, std::shared_ptr<const void> owner,
                             std::uint32_t triangles = 0) {
   ViewerMessage message;
-  message.head.reserve(frame_header_size + colour_header_size);
   Writer writer(message.head);
   const ColourImage* colour = header.colour.get();
   const Colours colours = colour == nullptr ? Colours::none
@@ -184,7 +178,6 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   const Tick& tick = record.tick;
   const auto contacts = std::span(tick.contacts).first(tick.contact_count);
   ViewerMessage message;
-  message.head.reserve(ticks_header_size + contacts.size() * contact_size + count * sample_size);
   Writer writer(message.head);
   Vec3 asked = record.region;
   join(tick.force, asked);
@@ -211,9 +204,10 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   return message;
 }
 
-ViewerMessage text_message(const std::string& text) {
+ViewerMessage text_message(const nlohmann::json& words) {
   ViewerMessage message;
   message.text = true;
+  const std::string text = words.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   const auto bytes = std::as_bytes(std::span(text));
   message.head.assign(bytes.begin(), bytes.end());
   return message;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <Eigen/Geometry>
+#include <nlohmann/json_fwd.hpp>
 
 #include "palpate/kernel/cloud/frame.hpp"
 #include "palpate/kernel/core/hand.hpp"
@@ -92,7 +93,8 @@ struct TickBatch {
 };
 ViewerMessage ticks_message(const TickBatch& batch);
 
-ViewerMessage text_message(const std::string& text);
+/// A message in words. Text that is not UTF-8 is sent with replacements.
+ViewerMessage text_message(const nlohmann::json& words);
 
 /// The page's hand: where it is to be, or that it was let go.
 struct HandMessage {

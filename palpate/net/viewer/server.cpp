@@ -33,6 +33,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using asio::ip::tcp;
+using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 using SharedMessage = std::shared_ptr<const ViewerMessage>;
@@ -106,23 +107,17 @@ std::string source_of(const tcp::socket& socket) {
   return asio::ip::make_address_v6(bytes).to_string();
 }
 
-// A JSON object with another member in front.
-std::string with_member(const std::string& object, std::string_view name, std::string_view text) {
-  std::string made = "{\"" + std::string(name) + "\":\"" + std::string(text) + "\"";
-  if (object.size() > 2) made += ",";
-  return made + object.substr(1);
+SharedMessage shared_text(const json& words) {
+  return std::make_shared<const ViewerMessage>(text_message(words));
 }
 
 // One of a limited number of places, taken from the request on until the page has gone.
-struct GiveBack {
-  void operator()(int* taken) const { --*taken; }
-};
-using Place = std::unique_ptr<int, GiveBack>;
+using Place = std::shared_ptr<int>;
 
 Place take_place(int& taken, int most) {
   if (taken >= most) return nullptr;
   ++taken;
-  return Place(&taken);
+  return {&taken, [](int* count) { --*count; }};
 }
 
 // With what a page comes in.
@@ -180,10 +175,7 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   }
   void may_explain_again() { explained_ = false; }
 
-  void refuse(std::string_view why) {
-    send(std::make_shared<const ViewerMessage>(text_message(nlohmann::json{{"error", why}}.dump(
-        -1, ' ', false, nlohmann::json::error_handler_t::replace))));
-  }
+  void refuse(std::string_view why) { send(shared_text(json{{"error", why}})); }
 
   // What belongs to a camera; its newest frame takes the place of one that has not been sent yet.
   void show(std::size_t camera, const SharedMessage& message) {
@@ -387,11 +379,11 @@ class ViewerServer::Impl final : public Hub {
   void joined(const std::shared_ptr<PageSession>& page) override {
     pages_.push_back(page);
     viewers_ = pages_.size();
-    std::string hello = with_member(host_.hello(), "role", to_string(role_of(*page)));
-    if (page->admission().needs_token)
-      hello = with_member(hello, "operator_token", operator_token_);
-    if (page->admission().unknown_token) hello = with_member(hello, "token", "unknown");
-    page->send(shared_text("{\"hello\":" + hello + "}"));
+    json hello = host_.hello();
+    hello["role"] = to_string(role_of(*page));
+    if (page->admission().needs_token) hello["operator_token"] = operator_token_;
+    if (page->admission().unknown_token) hello["token"] = "unknown";
+    page->send(shared_text(json{{"hello", std::move(hello)}}));
     send_state({page});
     for (std::size_t camera = 0; camera < cameras_.size(); ++camera)
       for (const auto& [kind, message] : cameras_[camera]) page->show(camera, message);
@@ -531,10 +523,10 @@ class ViewerServer::Impl final : public Hub {
       for (const auto& page : pages_) page->send(message);
     };
     if (batch) tell(std::make_shared<const ViewerMessage>(ticks_message(*batch)));
-    if (const std::string robot = host_.robot(); !robot.empty())
-      tell(shared_text("{\"robot\":" + robot + "}"));
-    if (const std::string hands = host_.more_hands(); !hands.empty())
-      tell(shared_text("{\"more_hands\":" + hands + "}"));
+    if (const json robot = host_.robot(); !robot.is_null())
+      tell(shared_text(json{{"robot", robot}}));
+    if (const json hands = host_.more_hands(); !hands.is_null())
+      tell(shared_text(json{{"more_hands", hands}}));
     if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 
@@ -550,8 +542,8 @@ class ViewerServer::Impl final : public Hub {
       const char* hand = hand_owner_ == nullptr      ? "free"
                          : hand_owner_ == page.get() ? "you"
                                                      : "other";
-      const nlohmann::json presence = {{"hand", hand}, {"viewers", pages_.size()}};
-      page->send(shared_text(nlohmann::json{{"presence", presence}}.dump()));
+      const json presence = {{"hand", hand}, {"viewers", pages_.size()}};
+      page->send(shared_text(json{{"presence", presence}}));
       if (hand_changed) page->may_explain_again();
     }
     if (hand_changed) send_state(pages_);
@@ -560,13 +552,13 @@ class ViewerServer::Impl final : public Hub {
   // The state with each page's role; one message for all of a role.
   void send_state(const std::vector<std::shared_ptr<PageSession>>& pages) {
     if (pages.empty()) return;
-    const std::string state = host_.state();
+    json words = {{"state", host_.state()}};
     std::map<Role, SharedMessage> messages;
     for (const auto& page : pages) {
       const Role role = role_of(*page);
       SharedMessage& message = messages[role];
-      if (!message)
-        message = shared_text("{\"state\":" + with_member(state, "role", to_string(role)) + "}");
+      words["state"]["role"] = to_string(role);
+      if (!message) message = shared_text(words);
       page->send(message);
     }
   }
@@ -585,10 +577,6 @@ class ViewerServer::Impl final : public Hub {
         for (const auto& page : pages_) page->show(i, message);
       }
     }
-  }
-
-  static SharedMessage shared_text(const std::string& text) {
-    return std::make_shared<const ViewerMessage>(text_message(text));
   }
 
   using Seconds = std::chrono::duration<double>;
@@ -726,7 +714,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
                             });
   }
 
-  void answer(const Request& request) {
+  void answer(Request request) {
     Admission admission = server_.judge(request, source_);
     if (admission.status == http::status::ok && websocket::is_upgrade(request)) {
       std::make_shared<PageSession>(server_, std::move(stream_), std::move(admission))
@@ -736,7 +724,15 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     http::status status = admission.status;
     if (status == http::status::ok) {
       const std::string_view path = path_of(request);
-      if (path == "/splat" && give_splat(request)) return;
+      if (path == "/splat" && request.method() == http::verb::get) {
+        splat_ = server_.host_.gaussians();
+        const std::string_view bytes(reinterpret_cast<const char*>(splat_.data()),
+                                     splat_.size() * sizeof(splat_.front()));
+        if (!bytes.empty()) {
+          request.keep_alive(false);
+          return write(request, status, "application/octet-stream", bytes);
+        }
+      }
       for (const PageFile& file : page_files())
         if (file.path == path) return write(request, status, file.type, file.content);
       status = http::status::not_found;
@@ -744,34 +740,22 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     write(request, status, "text/plain; charset=utf-8", explanation(status));
   }
 
-  // What pages draw of the splat that is felt. @return whether there is one
-  bool give_splat(const Request& request) {
-    if (request.method() == http::verb::head) return false;
-    splat_ = server_.host_.gaussians();
-    if (splat_.empty()) return false;
-    Response& response = response_.emplace(http::status::ok, request.version());
-    set_head(response, "application/octet-stream");
-    response.keep_alive(false);
-    response.body() = {reinterpret_cast<const char*>(splat_.data()),
-                       splat_.size() * sizeof(splat_.front())};
-    response.prepare_payload();
-    serializer_.emplace(response);
-    give_more();
-    return true;
+  static std::string_view explanation(http::status status) {
+    static const std::map<http::status, std::string_view> texts = {
+        {http::status::method_not_allowed, "Only GET and HEAD are answered.\n"},
+        {http::status::forbidden, "Not from this host or origin.\n"},
+        {http::status::unauthorized, "The token is missing or wrong.\n"},
+        {http::status::conflict, "Another file is being sent.\n"},
+        {http::status::too_many_requests,
+         "Too many wrong tokens came from this address; wait five minutes.\n"},
+        {http::status::service_unavailable, "Too many pages are open.\n"}};
+    const auto found = texts.find(status);
+    return found == texts.end() ? "There is no such page.\n" : found->second;
   }
 
-  // As much as the connection takes, for which there is time again each time.
-  void give_more() {
-    stream_.expires_after(answer_timeout);
-    http::async_write_some(stream_, *serializer_,
-                           [self = shared_from_this()](beast::error_code error, std::size_t) {
-                             if (error) return;
-                             if (!self->serializer_->is_done()) return self->give_more();
-                             self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
-                           });
-  }
-
-  static void set_head(Response& response, std::string_view type) {
+  void write(const Request& request, http::status status, std::string_view type,
+             std::string_view content) {
+    Response& response = response_.emplace(status, request.version());
     response.set(http::field::content_type, {type.data(), type.size()});
     response.set(http::field::cache_control, "no-store");
     response.set("Content-Security-Policy",
@@ -780,45 +764,33 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     response.set("X-Content-Type-Options", "nosniff");
     response.set("Referrer-Policy", "no-referrer");  // the address holds the token
     response.set("Cross-Origin-Resource-Policy", "same-origin");
-  }
-
-  static std::string_view explanation(http::status status) {
-    switch (status) {
-      case http::status::method_not_allowed:
-        return "Only GET and HEAD are answered.\n";
-      case http::status::forbidden:
-        return "Not from this host or origin.\n";
-      case http::status::unauthorized:
-        return "The token is missing or wrong.\n";
-      case http::status::conflict:
-        return "Another file is being sent.\n";
-      case http::status::too_many_requests:
-        return "Too many wrong tokens came from this address; wait five minutes.\n";
-      case http::status::service_unavailable:
-        return "Too many pages are open.\n";
-      default:
-        return "There is no such page.\n";
-    }
-  }
-
-  void write(const Request& request, http::status status, std::string_view type,
-             std::string_view content) {
-    response_.emplace(status, request.version());
-    Response& response = *response_;
-    set_head(response, type);
     response.keep_alive(request.keep_alive());
     response.content_length(content.size());
     if (request.method() != http::verb::head) response.body() = {content.data(), content.size()};
+    serializer_.emplace(response);
     stream_.expires_after(answer_timeout);
-    http::async_write(stream_, response,
-                      [self = shared_from_this()](beast::error_code error, std::size_t) {
-                        if (self->file_parser_ && self->response_->result() == http::status::ok)
-                          self->end_file(true);
-                        if (error) return;
-                        if (self->response_->keep_alive()) return self->read();
-                        self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
-                        if (self->drains_) self->drain();
-                      });
+    write_more();
+  }
+
+  // As much as the connection takes. A splat may be large: there is time again for each part.
+  void write_more() {
+    http::async_write_some(stream_, *serializer_,
+                           [self = shared_from_this()](beast::error_code error, std::size_t) {
+                             if (!error && !self->serializer_->is_done()) {
+                               if (!self->splat_.empty())
+                                 self->stream_.expires_after(answer_timeout);
+                               return self->write_more();
+                             }
+                             self->written(error);
+                           });
+  }
+
+  void written(beast::error_code error) {
+    if (file_parser_ && response_->result() == http::status::ok) end_file(true);
+    if (error) return;
+    if (response_->keep_alive()) return read();
+    stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+    if (drains_) drain();
   }
 
   Impl& server_;

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/net/viewer/protocol.hpp"
 #include "palpate/net/viewer/roles.hpp"
@@ -24,13 +26,13 @@ class ViewerHost {
   virtual ~ViewerHost() = default;
 
   /// The first message to a page, as the JSON object of docs/protocol.md.
-  virtual std::string hello() = 0;
+  virtual nlohmann::json hello() = 0;
   /// The state message that pages get a few times a second, likewise.
-  virtual std::string state() = 0;
-  /// The robot that the hand leads, likewise, 30 times a second; empty: there is none.
-  virtual std::string robot() { return {}; }
-  /// The hands beside the first, likewise, 30 times a second; empty: there are none.
-  virtual std::string more_hands() { return {}; }
+  virtual nlohmann::json state() = 0;
+  /// The robot that the hand leads, likewise, 30 times a second; null: there is none.
+  virtual nlohmann::json robot() = 0;
+  /// The hands beside the first, likewise, 30 times a second; null: there are none.
+  virtual nlohmann::json more_hands() = 0;
   /// Ticks since the last call; none if there was no tick.
   virtual std::optional<TickBatch> ticks() = 0;
   /// Does a page move the session's device? If not, no page ever holds the hand.

@@ -27,31 +27,76 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PortEnergy, made, generating)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SceneChoice, uri, meaning, group)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Playback, paused, loop, speed)
 
-namespace {
-
 using nlohmann::json;
+
+template <class Owner>
+static void to_json(json& shown, const ParameterRow<Owner>& row) {
+  shown = {{"name", row.name},       {"symbol", row.symbol},
+           {"unit", row.unit},       {"default", row.default_value},
+           {"min", row.min},         {"max", row.max},
+           {"meaning", row.meaning}, {"source", row.source}};
+}
+
+static void to_json(json& shown, const MethodInfo& method) {
+  shown = {{"name", method.name}, {"meaning", method.summary}};
+}
+
+static void to_json(json& shown, const TickFlagInfo& flag) {
+  shown = {{"name", flag.name}, {"meaning", flag.meaning}};
+}
+
+static void to_json(json& shown, const CameraStatus& camera) {
+  shown = {{"uri", camera.uri},
+           {"kind", camera.kind},
+           {"sensor", name_of(camera.sensor)},
+           {"rate", camera.rate},
+           {"state", camera.text},
+           {"stays_valid", camera.stays_valid},
+           {"dropped", camera.dropped},
+           {"frames", camera.recorded},
+           {"place", camera.place},
+           {"time", camera.recorded_time}};
+}
+
+static void to_json(json& shown, const Dab& dab) {
+  shown = {{"place", dab.place},
+           {"normal", dab.normal},
+           {"radius", dab.radius},
+           {"material", dab.material}};
+}
+
+static void to_json(json& shown, const FixtureSet::Item& item) {
+  const Fixture& fixture = item.fixture;
+  json pose = json::array();  // row by row
+  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
+  Vec3 size = fixture.size;
+  json points = json::array();
+  if (fixture.shape == FixtureShape::mesh) {  // its box
+    Eigen::AlignedBox3d box;
+    for (const Vec3& point : fixture.points) box.extend(point);
+    size = box.sizes();
+    const Vec3 middle = fixture.world_from_fixture * box.center();
+    for (int axis = 0; axis < 3; ++axis)
+      pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
+  } else {
+    points = fixture.points;
+  }
+  shown = {{"name", fixture.name},
+           {"kind", fixture_kind_names()[static_cast<std::size_t>(fixture.kind)]},
+           {"shape", fixture_shape_names()[static_cast<std::size_t>(fixture.shape)]},
+           {"pose", pose},
+           {"size", size},
+           {"radius", fixture.radius},
+           {"length", fixture.length},
+           {"points", points}};
+}
+
+namespace {
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
 constexpr std::array<const char*, 7> tools = {
     "ball",        "box:40x20x5mm",    "box:30x30x30mm", "capsule:80x8mm", "cylinder:40x20mm",
     "cone:60x6mm", "gripper:40x30x8mm"};
-
-json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-
-template <class Owner>
-json rows_json(std::span<const ParameterRow<Owner>> table) {
-  json rows = json::array();
-  for (const auto& row : table)
-    rows.push_back({{"name", row.name},
-                    {"symbol", row.symbol},
-                    {"unit", row.unit},
-                    {"default", row.default_value},
-                    {"min", row.min},
-                    {"max", row.max},
-                    {"meaning", row.meaning},
-                    {"source", row.source}});
-  return rows;
-}
 
 template <class Owner>
 json values_json(std::span<const ParameterRow<Owner>> table, const Owner& owner) {
@@ -65,6 +110,21 @@ std::string realtime_text(const RealtimeReport& report) {
                                  : "not real-time; see palpate doctor";
   if (report.core >= 0) text += ", core " + std::to_string(report.core);
   return text;
+}
+
+json servo_json(const Session& session, const SessionState& state) {
+  const CycleStatistics& cycles = session.statistics();
+  json servo = {{"rate", state.rate},
+                {"ticks", cycles.ticks.load()},
+                {"late_ticks", state.hands.front().summary.late_ticks},
+                {"frames_adopted", cycles.frames_adopted.load()},
+                {"frames_dropped", cycles.frames_dropped.load()}};
+  if (const Timing* timing = session.timing()) {
+    servo["realtime"] = realtime_text(*session.realtime());
+    servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
+    servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
+  }
+  return servo;
 }
 
 // t [s from its first frame], x, y, z [m] of the hand in a recording; empty if it has none.
@@ -87,31 +147,6 @@ std::vector<float> path_of(const std::string& uri) {
 std::string_view stricter_text(std::string_view limit) {
   constexpr std::array<std::string_view, 3> names{"lower", "higher", ""};
   return names[static_cast<std::size_t>(stricter_direction(limit))];
-}
-
-json fixture_to_draw(const Fixture& fixture) {
-  json pose = json::array();  // row by row
-  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
-  Vec3 size = fixture.size;
-  json points = nlohmann::json::array();
-  if (fixture.shape == FixtureShape::mesh) {  // its box
-    Eigen::AlignedBox3d box;
-    for (const Vec3& point : fixture.points) box.extend(point);
-    size = box.sizes();
-    const Vec3 middle = fixture.world_from_fixture * box.center();
-    for (int axis = 0; axis < 3; ++axis)
-      pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
-  } else {
-    for (const Vec3& point : fixture.points) points.push_back(numbers(point));
-  }
-  return {{"name", fixture.name},
-          {"kind", fixture_kind_names()[static_cast<std::size_t>(fixture.kind)]},
-          {"shape", fixture_shape_names()[static_cast<std::size_t>(fixture.shape)]},
-          {"pose", pose},
-          {"size", numbers(size)},
-          {"radius", fixture.radius},
-          {"length", fixture.length},
-          {"points", points}};
 }
 
 namespace fs = std::filesystem;
@@ -164,16 +199,10 @@ void SessionHost::show_on(ViewerServer* server) {
   }
 }
 
-std::string SessionHost::hello() {
-  json safety = rows_json(safety_parameter_table());
+json SessionHost::hello() {
+  json safety = safety_parameter_table();
   for (json& row : safety) row["stricter"] = stricter_text(row["name"].get<std::string>());
-  json methods = json::array();
-  json flags = json::array();
   json safety_flags = json::array();
-  for (const MethodInfo& row : session_->methods().entries())
-    methods.push_back({{"name", row.name}, {"meaning", row.summary}});
-  for (const TickFlagInfo& flag : tick_flag_table())
-    flags.push_back({{"name", flag.name}, {"meaning", flag.meaning}});
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety_flags.push_back(
         {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
@@ -182,19 +211,18 @@ std::string SessionHost::hello() {
       std::find(choices.begin(), choices.end(), first_tool_->text()) == choices.end())
     choices.push_back(first_tool_->text());
   const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
-  return json{{"file_limit", most},
-              {"scenes", rules_.scenes},
-              {"notice", rules_.notice},
-              {"splat", Uri(session_->state().cameras.front().uri).scheme() == "splat"},
-              {"version", version_},
-              {"methods", methods},
-              {"tools", choices},
-              {"parameters", rows_json(parameter_table())},
-              {"safety", safety},
-              {"placement", rows_json(placement_table())},
-              {"flags", flags},
-              {"safety_flags", safety_flags}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  return {{"file_limit", most},
+          {"scenes", rules_.scenes},
+          {"notice", rules_.notice},
+          {"splat", Uri(session_->state().cameras.front().uri).scheme() == "splat"},
+          {"version", version_},
+          {"methods", session_->methods().entries()},
+          {"tools", choices},
+          {"parameters", parameter_table()},
+          {"safety", safety},
+          {"placement", placement_table()},
+          {"flags", tick_flag_table()},
+          {"safety_flags", safety_flags}};
 }
 
 void SessionHost::forbid(const Forbid& wanted) {
@@ -292,26 +320,29 @@ void SessionHost::rescale(double times) {
   rules_.open_scene(uri);
 }
 
-std::string SessionHost::state() {
+json SessionHost::recording_json(const RecordingState& recording) const {
+  json shown = {{"path", nullptr},
+                {"message", recording.message},
+                {"ended", recording_ended()},
+                {"seconds", recording.seconds},
+                {"bytes", recording.bytes},
+                {"room", nullptr},
+                {"open", nullptr}};
+  if (recording.on) shown["path"] = recording.folder;
+  if (const auto room = recordings_ ? recordings_->room() : std::nullopt) shown["room"] = *room;
+  if (const std::string uri = recorded_scene(recording); !uri.empty()) shown["open"] = uri;
+  return shown;
+}
+
+json SessionHost::state() {
   SessionState state = session_->state();
   look_at_points(state.cameras.front().uri);
   show_tool(state.settings.tool);
-  json cameras = json::array();
   const SessionHandState& first = state.hands.front();
+  const auto playing = std::find_if(state.cameras.begin(), state.cameras.end(),
+                                    [](const CameraStatus& camera) { return camera.recorded > 1; });
   json playback;
-  for (const CameraStatus& status : state.cameras) {
-    cameras.push_back({{"uri", status.uri},
-                       {"kind", status.kind},
-                       {"sensor", name_of(status.sensor)},
-                       {"rate", status.rate},
-                       {"state", status.text},
-                       {"stays_valid", status.stays_valid},
-                       {"dropped", status.dropped},
-                       {"frames", status.recorded},
-                       {"place", status.place},
-                       {"time", status.recorded_time}});
-    if (status.recorded > 1 && playback.is_null()) playback = status.playback;
-  }
+  if (playing != state.cameras.end()) playback = playing->playback;
   json points;
   if (proposed_)
     points = {{"extent", proposed_->extent},
@@ -322,97 +353,60 @@ std::string SessionHost::state() {
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     if ((first.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
   }
-  const CycleStatistics& cycles = session_->statistics();
-  json servo = {{"rate", state.rate},
-                {"ticks", cycles.ticks.load()},
-                {"late_ticks", first.summary.late_ticks},
-                {"frames_adopted", cycles.frames_adopted.load()},
-                {"frames_dropped", cycles.frames_dropped.load()}};
-  if (const Timing* timing = session_->timing()) {
-    servo["realtime"] = realtime_text(*session_->realtime());
-    servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
-    servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
-  }
-  json recording = {{"path", nullptr},
-                    {"message", state.recording.message},
-                    {"ended", recording_ended()},
-                    {"seconds", state.recording.seconds},
-                    {"bytes", state.recording.bytes},
-                    {"room", nullptr},
-                    {"open", nullptr}};
-  if (state.recording.on) recording["path"] = state.recording.folder;
-  if (const auto room = recordings_ ? recordings_->room() : std::nullopt) recording["room"] = *room;
-  if (const std::string uri = recorded_scene(state.recording); !uri.empty())
-    recording["open"] = uri;
-  json dabs = json::array();
-  for (const Dab& dab : session_->paint().dabs())
-    dabs.push_back({{"place", numbers(dab.place)},
-                    {"normal", numbers(dab.normal)},
-                    {"radius", dab.radius},
-                    {"material", dab.material}});
   json fixtures = json::array();
-  if (state.settings.fixtures) {
-    for (const FixtureSet::Item& item : state.settings.fixtures->items())
-      fixtures.push_back(fixture_to_draw(item.fixture));
-  }
+  if (state.settings.fixtures) fixtures = state.settings.fixtures->items();
   json brush;
   if (brush_) brush = {{"material", brush_->material}, {"radius", brush_->radius}};
   const DeviceInfo& device = session_->device().info();
   const std::vector<std::string> warnings =
       stiffness_warnings(device, state.settings.parameters.coupling.stiffness,
                          state.settings.placement.workspace_scale, state.rate);
-  return json{
-      {"method", state.settings.method},
-      {"tool", state.settings.tool ? state.settings.tool->text() : "ball"},
-      {"parameters", values_json(parameter_table(), state.settings.parameters)},
-      {"safety", values_json(safety_parameter_table(), state.settings.safety)},
-      {"placement", values_json(placement_table(), state.settings.placement)},
-      {"cameras", cameras},
-      {"playback", playback},
-      {"points", points},
-      {"device",
-       {{"uri", device.uri},
-        {"kind", device.kind},
-        {"takes_hand", mouse_ != nullptr},
-        {"fault", first.device.text},
-        {"warnings", warnings}}},
-      {"servo", servo},
-      {"interventions", first.interventions},
-      {"latched_by", latched_by},
-      {"on_hold", state.held},
-      {"flag_ticks", first.summary.flag_ticks},
-      {"pop_throughs", first.summary.pop_throughs},
-      {"energy",
-       {{"contacts", first.summary.energy.contacts},
-        {"relative", first.summary.energy.relative},
-        {"absolute", first.summary.energy.absolute}}},
-      {"fixtures", fixtures},
-      {"paint",
-       {{"brush", brush}, {"dabs", dabs}, {"materials", paintable()}, {"trouble", brush_trouble_}}},
-      {"recording", recording}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  return {{"method", state.settings.method},
+          {"tool", state.settings.tool ? state.settings.tool->text() : "ball"},
+          {"parameters", values_json(parameter_table(), state.settings.parameters)},
+          {"safety", values_json(safety_parameter_table(), state.settings.safety)},
+          {"placement", values_json(placement_table(), state.settings.placement)},
+          {"cameras", state.cameras},
+          {"playback", playback},
+          {"points", points},
+          {"device",
+           {{"uri", device.uri},
+            {"kind", device.kind},
+            {"takes_hand", mouse_ != nullptr},
+            {"fault", first.device.text},
+            {"warnings", warnings}}},
+          {"servo", servo_json(*session_, state)},
+          {"interventions", first.interventions},
+          {"latched_by", latched_by},
+          {"on_hold", state.held},
+          {"flag_ticks", first.summary.flag_ticks},
+          {"pop_throughs", first.summary.pop_throughs},
+          {"energy",
+           {{"contacts", first.summary.energy.contacts},
+            {"relative", first.summary.energy.relative},
+            {"absolute", first.summary.energy.absolute}}},
+          {"fixtures", fixtures},
+          {"paint",
+           {{"brush", brush},
+            {"dabs", session_->paint().dabs()},
+            {"materials", paintable()},
+            {"trouble", brush_trouble_}}},
+          {"recording", recording_json(state.recording)}};
 }
 
-std::string SessionHost::robot() {
+json SessionHost::robot() {
   const std::optional<RobotPicture> robot = rules_.robot ? rules_.robot() : std::nullopt;
   if (!robot) return {};
-  json links = json::array();
-  for (const Vec3& link : robot->links) links.push_back(numbers(link));
   json tool;
-  if (robot->tool) tool = numbers(*robot->tool);
-  return json{{"name", robot->name},
-              {"tool", tool},
-              {"links", links},
-              {"force", numbers(robot->force)},
-              {"radius", robot->radius},
-              {"age", robot->age},
-              {"latency", robot->latency},
-              {"led", robot->led},
-              {"trouble", robot->trouble}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  if (robot->tool) tool = *robot->tool;
+  return {{"name", robot->name},       {"tool", tool},
+          {"links", robot->links},     {"force", robot->force},
+          {"radius", robot->radius},   {"age", robot->age},
+          {"latency", robot->latency}, {"led", robot->led},
+          {"trouble", robot->trouble}};
 }
 
-std::string SessionHost::more_hands() {
+json SessionHost::more_hands() {
   if (others_.empty()) return {};
   json hands = json::array();
   for (std::size_t i = 0; i < others_.size(); ++i) {
@@ -421,14 +415,14 @@ std::string SessionHost::more_hands() {
     }
     const Tick& tick = other.newest.tick;
     hands.push_back({{"name", session_->hand_name(i + 1)},
-                     {"hip", numbers(tick.hip)},
-                     {"proxy", numbers(tick.proxy)},
-                     {"force", numbers(other.newest.force)},
+                     {"hip", tick.hip},
+                     {"proxy", tick.proxy},
+                     {"force", other.newest.force},
                      {"touches", tick.state != ContactState::free_motion},
                      {"present", (other.newest.hand & hand_present) != 0},
                      {"trouble", describe(fault_of(other.newest.hand))}});
   }
-  return hands.dump(-1, ' ', false, json::error_handler_t::replace);
+  return hands;
 }
 
 // To all pages, if it is another than before.

@@ -114,10 +114,10 @@ class SessionHost final : public ViewerHost {
   /// A camera's frame, as SessionOptions::on_frame: to all pages. Any camera's thread.
   void show(std::size_t camera, const FedFrame& frame);
 
-  std::string hello() override;
-  std::string state() override;
-  std::string robot() override;
-  std::string more_hands() override;
+  nlohmann::json hello() override;
+  nlohmann::json state() override;
+  nlohmann::json robot() override;
+  nlohmann::json more_hands() override;
   std::optional<TickBatch> ticks() override;
   bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const HandMessage& hand) override;
@@ -139,6 +139,7 @@ class SessionHost final : public ViewerHost {
   [[nodiscard]] std::vector<std::string> paintable() const;
   void show_tool(const std::shared_ptr<const ToolShape>& tool);
   [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
+  [[nodiscard]] nlohmann::json recording_json(const RecordingState& recording) const;
   void look_at_points(const std::string& uri);
   void rescale(double times);
   void paint(const ServoTick& record, double contact_radius);

@@ -82,11 +82,6 @@ SessionConfig MethodOptions::session(const MethodRegistry& methods) const {
   return config;
 }
 
-MethodChoice MethodOptions::choice(const MethodRegistry& methods) const {
-  SessionConfig config = session(methods);
-  return {std::move(config.method), config.parameters};
-}
-
 namespace {
 
 // The cameras named on the command line, with what the file says of those of the same URI.

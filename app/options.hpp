@@ -13,12 +13,6 @@
 
 namespace palpate::app {
 
-/// A method by its name, and the parameters for it.
-struct MethodChoice {
-  std::string name;
-  Parameters parameters;
-};
-
 /// The options that choose a method and its parameters, the same for every verb that renders.
 /// Order of precedence: defaults, --config, --method and --set.
 class MethodOptions {
@@ -28,11 +22,10 @@ class MethodOptions {
   /// The same without --method.
   void add_parameters_to(CLI::App& command);
 
+  /// With all else that the configuration file says.
   /// @throws UnknownMethod for a method that is not among these.
   /// @throws Error for an unknown parameter or key, a value out of range, or a
   ///         configuration file that cannot be read.
-  [[nodiscard]] MethodChoice choice(const MethodRegistry& methods) const;
-  /// The same with all else that the configuration file says.
   [[nodiscard]] SessionConfig session(const MethodRegistry& methods) const;
 
   /// Is there a configuration file?

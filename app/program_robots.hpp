@@ -13,7 +13,7 @@ namespace palpate::app {
 
 /// A robot, and its camera where it has one of its own.
 struct Cell {
-  std::function<std::unique_ptr<Robot>()> robot;    ///< once
+  std::function<std::shared_ptr<Robot>()> robot;    ///< once
   std::function<std::unique_ptr<Source>()> camera;  ///< once; empty: none
   /// Sees the camera's frames; empty: it need not.
   std::function<void(const FedFrame&)> on_frame;

@@ -12,22 +12,13 @@ namespace {
 Cell open_scene(const std::string& uri) {
   auto camera = open_synthetic_camera(Uri(uri));
   const Vec3 begin(0.0, 0.0, 0.12);  // [m] above what scenes have in the middle
-  std::shared_ptr<SceneRobot> robot =
+  // Of whoever leads it, and of whoever shows it frames.
+  const std::shared_ptr<SceneRobot> robot =
       open_scene_robot(std::make_shared<const Scene>(camera->scene()), begin, uri);
-  // Whoever leads it has the robot; whoever shows it frames knows it as long as they come.
-  struct Shared final : Robot {
-    explicit Shared(std::shared_ptr<SceneRobot> one) : robot(std::move(one)) {}
-    [[nodiscard]] const RobotInfo& info() const override { return robot->info(); }
-    void command(const HandPose& pose, const Vec3& velocity, double t) noexcept override {
-      robot->command(pose, velocity, t);
-    }
-    [[nodiscard]] std::optional<RobotState> state() override { return robot->state(); }
-    std::shared_ptr<SceneRobot> robot;
-  };
   const std::shared_ptr<std::unique_ptr<Source>> source =
       std::make_shared<std::unique_ptr<Source>>(std::move(camera));
   return {
-      .robot = [robot] { return std::make_unique<Shared>(robot); },
+      .robot = [robot] { return robot; },
       .camera = [source] { return std::move(*source); },
       .on_frame =
           [robot](const FedFrame& frame) { robot->relate(frame.frame.stamp, frame.source_stamp); }};

@@ -331,8 +331,8 @@ std::string doctor_text(const Json& report) {
   const Json& time = report["realtime"];
   std::string text = fmt::format(
       "{} for haptics at {} Hz: with its delay of {:.2f} ms a device may have walls of up to "
-      "{:.0f} "
-      "N/m for each N s/m of its damping\n\n{}{}  real-time scheduling: {}; memory: {}; core: {}; "
+      "{:.0f} N/m for each N s/m of its damping\n\n{}{}  real-time scheduling: {}; memory: {}; "
+      "core: {}; "
       "cores: {}\n",
       report["fit"].get<bool>() ? "Fit" : "Not fit", number_of(time["rate_hz"]),
       1e3 * number_of(time["delay_s"]), number_of(time["stiffness_per_damping_1_s"]),

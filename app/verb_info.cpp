@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -46,16 +46,12 @@ Json numbers(const Vec3& v) {
 
 // What the points of a cloud span: count, corners of their box.
 Json extent(const std::vector<Vec3>& points) {
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
-  Vec3 high = -low;
-  for (const Vec3& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
+  Eigen::AlignedBox3d box;
+  for (const Vec3& point : points) box.extend(point);
   Json json = {{"points", points.size()}};
   if (!points.empty()) {
-    json["lowest_m"] = numbers(low);
-    json["highest_m"] = numbers(high);
+    json["lowest_m"] = numbers(box.min());
+    json["highest_m"] = numbers(box.max());
   }
   return json;
 }
@@ -191,11 +187,10 @@ int info(InfoOptions options) {
   json["first_frame"] = first;
   if (!options.at.empty()) json["at"] = describe_pixel(*frame->cloud, options.at, options.uri);
 
-  if (options.json) {
+  if (options.json)
     fmt::print("{}\n", json.dump(2));
-    return 0;
-  }
-  print(json, "");
+  else
+    print(json, "");
   return 0;
 }
 

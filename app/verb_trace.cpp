@@ -139,9 +139,8 @@ std::optional<Press> press_of(const TraceOptions& options, const FrameSequence& 
   return Press(*playback.upcoming(0)->cloud, parse_pixel(options.press, "--press"), pressing);
 }
 
-int trace(TraceOptions options) {
-  for (std::string& camera : options.cameras)
-    camera = with_material(source_uri(camera, all_sources()), options.material);
+// @throws Error for what cannot be, or not together.
+void check(const TraceOptions& options) {
   if (!(options.rate >= 1.0 && options.rate <= 100000.0))
     throw Error("--rate", std::to_string(options.rate) + " Hz is not a tick rate",
                 "give 1 to 100000");
@@ -152,32 +151,58 @@ int trace(TraceOptions options) {
                 "give a CSV file with --path, or a pixel of the first frame with --press U,V");
   if (options.press.empty() && !options.slide_to.empty())
     throw Error("--slide-to", "there is no --press to slide from", "add --press U,V");
-  FrameSequence playback(options.cameras);
-  std::optional<Press> press = press_of(options, playback);
-  const std::optional<HipPath> path =
-      press ? std::nullopt : std::optional(HipPath::read_csv(options.path));
+}
+
+Parameters parameters_for(const FrameSequence& playback, const SessionConfig& config) {
+  const Parameters parameters = for_sensors(config.parameters, playback.sensors());
+  if (config.radii_chosen) return parameters;
+  std::vector<const Cloud*> seen;
+  for (std::size_t i = 0; i < playback.cameras(); ++i)
+    seen.push_back(playback.upcoming(i)->cloud.get());
+  return for_points(parameters, seen);
+}
+
+void say_notes(const FrameSequence& playback) {
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
     const SourceInfo& about = playback.source(camera).info();
     std::vector<std::string> notes = about.notes;
     if (!about.assumed.empty()) notes.push_back(about.assumed);
     for (const std::string& note : notes) fmt::print(stderr, "palpate: {}: {}\n", about.uri, note);
   }
+}
+
+// What is odd about a trace that has ended.
+void say_remarks(const TraceOptions& options, const std::optional<Press>& press,
+                 const std::vector<std::string>& remarks) {
+  if (press && press->pixel() != parse_pixel(options.press, "--press") && options.slide_to.empty())
+    fmt::print(
+        stderr,
+        "palpate: pixel {} has no surface to press: the nearest one that has, {},{}, was pressed\n",
+        options.press, press->pixel().u, press->pixel().v);
+  for (const std::string& remark : remarks) fmt::print(stderr, "palpate: {}\n", remark);
+}
+
+int trace(TraceOptions options) {
+  for (std::string& camera : options.cameras)
+    camera = with_material(source_uri(camera, all_sources()), options.material);
+  check(options);
+  FrameSequence playback(options.cameras);
+  std::optional<Press> press = press_of(options, playback);
+  const std::optional<HipPath> path =
+      press ? std::nullopt : std::optional(HipPath::read_csv(options.path));
+  say_notes(playback);
   const MethodRegistry methods = program_methods(&playback.source(0));
   const SessionConfig config = options.method.session(methods);
   const std::string& name = config.method;
-  Parameters parameters = for_sensors(config.parameters, playback.sensors());
-  std::vector<const Cloud*> seen;
-  for (std::size_t i = 0; i < playback.cameras(); ++i)
-    seen.push_back(playback.upcoming(i)->cloud.get());
-  if (!config.radii_chosen) parameters = for_points(parameters, seen);
+  const Parameters parameters = parameters_for(playback, config);
+  const Cloud& first = *playback.upcoming(0)->cloud;
   const double r_c = parameters.proxy.r_c();
-  if (const std::string remark = radius_remark(*seen.front(), r_c);
-      !config.radii_chosen && !remark.empty())
+  if (const std::string remark = radius_remark(first, r_c); !config.radii_chosen && !remark.empty())
     fmt::print(stderr, "palpate: {}: {}\n", options.cameras.front(), remark);
   const std::string& tool_text = options.tool ? *options.tool : config.tool;
   const auto tool = tool_text.empty() ? nullptr : read_tool(tool_text);
   const std::unique_ptr<Method> method = make_method(name, parameters, methods, tool);
-  const std::string sparse = sparse_remark(*seen.front(), options.cameras.front(), r_c);
+  const std::string sparse = sparse_remark(first, options.cameras.front(), r_c);
   playback.check(*method);  // before a file is written over
   TraceWriter writer(options.out, tool != nullptr);
   Summary summary;
@@ -200,13 +225,7 @@ int trace(TraceOptions options) {
   summary.frames = playback.adopted();
   writer.finish();
   progress.finish();
-  if (press && press->pixel() != parse_pixel(options.press, "--press") && options.slide_to.empty())
-    fmt::print(
-        stderr,
-        "palpate: pixel {} has no surface to press: the nearest one that has, {},{}, was pressed\n",
-        options.press, press->pixel().u, press->pixel().v);
-  for (const std::string& remark : remarks.lines(playback.shown(), options.cameras))
-    fmt::print(stderr, "palpate: {}\n", remark);
+  say_remarks(options, press, remarks.lines(playback.shown(), options.cameras));
   const int signal = interruption.signal();
   const bool is_whole = press ? press->done() : summary.ticks == static_cast<std::size_t>(ticks);
   if (!is_whole)

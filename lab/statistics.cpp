@@ -8,12 +8,12 @@
 #include <limits>
 #include <numbers>
 
+#include "lab/table.hpp"
+
 namespace palpate::lab {
 
 double mean(std::span<const double> values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+  return values.empty() ? 0.0 : sum(values) / static_cast<double>(values.size());
 }
 
 double rms(const std::vector<double>& values) {

@@ -18,18 +18,14 @@ constexpr double period = 1e-3;         // [s] of a tick
 constexpr double robot_speed = 0.25;    // [m/s] the reduced speed of ISO 10218
 constexpr double velocity_time = 5e-3;  // [s] of the filter behind an encoder's differences
 
-Vec3 no_longer_than(const Vec3& v, double longest) {
-  const double size = v.norm();
-  return size > longest ? Vec3(longest / size * v) : v;
-}
-
 class Coupling {
  public:
   Coupling() = default;
   virtual ~Coupling() = default;
   Coupling(const Coupling&) = delete;
   Coupling& operator=(const Coupling&) = delete;
-  virtual void frame(const std::shared_ptr<const Cloud>& cloud, double stamp, double t) = 0;
+  virtual void frame(const std::shared_ptr<const Cloud>& /*cloud*/, double /*stamp*/,
+                     double /*t*/) {}  // not seen by all
   // The tool's place and forces, and the force that the hand feels.
   virtual void tick(double t, SimulatedTool& tool, TeleopTick& out) = 0;
 };
@@ -159,8 +155,6 @@ class Palpate final : public Coupling {
 class ForceLink : public Coupling {
  public:
   ForceLink(SimulatedHand& hand, double peak) : hand_(hand), peak_(peak) {}
-  void frame(const std::shared_ptr<const Cloud>& /*cloud*/, double /*stamp*/,
-             double /*t*/) override {}
 
  protected:
   Vec3 read(double t) {

@@ -110,7 +110,6 @@ inline constexpr std::array<std::string_view, 4> teleop_ways{"palpate", "positio
 /// A millisecond at both ends.
 struct TeleopTick {
   double t = 0.0;                     ///< [s]
-  Vec3 hand = Vec3::Zero();           ///< [m] world: of the operator's handle, as it is read
   double hand_speed = 0.0;            ///< [m/s]
   Vec3 force = Vec3::Zero();          ///< [N] on the operator's hand
   double shake = 0.0;                 ///< [m] rms above 20 Hz, of the last 0.25 s

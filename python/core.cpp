@@ -245,7 +245,7 @@ void define_tables(py::module_& m) {
       py::arg("bits"), "What the safety chain did in a tick, from its `safety`.");
 }
 
-void define_clouds(py::module_& m) {
+void define_cameras(py::module_& m) {
   py::class_<Camera>(m, "Camera", "A pinhole camera; its viewing rays are computed once.")
       .def(py::init(&make_camera), py::arg("width"), py::arg("height"), py::arg("fx"),
            py::arg("fy"), py::arg("cx"), py::arg("cy"),
@@ -266,7 +266,9 @@ void define_clouds(py::module_& m) {
                ", fx=" + std::to_string(k.fx) + ", fy=" + std::to_string(k.fy) +
                ", cx=" + std::to_string(k.cx) + ", cy=" + std::to_string(k.cy) + ")";
       });
+}
 
+void define_clouds(py::module_& m) {
   py::class_<Cloud, std::shared_ptr<Cloud>>(m, "Cloud", "Whatever can be touched.")
       .def(
           "near",
@@ -282,7 +284,9 @@ void define_clouds(py::module_& m) {
            "The points within `radius` [m] of `centre` [m, world], as an array (n, 3).")
       .def_property_readonly("viewpoint", &CloudView::viewpoint,
                              "[m] world: from where they were seen, if that is known");
+}
 
+void define_materials(py::module_& m) {
   py::class_<MaterialsOf>(m, "Materials", "What surfaces are made of, and feel like.")
       .def(
           py::init(&make_materials), py::arg("what"),
@@ -299,7 +303,39 @@ void define_clouds(py::module_& m) {
           "in the order of their labels, from 1")
       .def("__len__",
            [](const MaterialsOf& materials) { return materials.table->materials.size(); });
+}
 
+// The image's own memory.
+py::array_t<std::uint16_t> depth_view(const py::object& self) {
+  const auto& image = py::cast<const DepthImage&>(self);
+  py::array_t<std::uint16_t> view({image.intrinsics().height, image.intrinsics().width},
+                                  image.depth().data(), self);
+  view.attr("setflags")(py::arg("write") = false);
+  return view;
+}
+
+std::optional<Singles> noise_of(const DepthImage& image) {
+  if (!image.noise()) return std::nullopt;
+  Singles noise({image.intrinsics().height, image.intrinsics().width});
+  std::transform(
+      image.noise()->begin(), image.noise()->end(), noise.mutable_data(),
+      [](std::uint16_t steps) { return static_cast<float>(steps / DepthImage::noise_steps); });
+  return noise;
+}
+
+py::array_t<float> metres_of(const DepthImage& image) {
+  const Intrinsics& k = image.intrinsics();
+  py::array_t<float> metres({k.height, k.width});
+  float* out = metres.mutable_data();
+  for (std::size_t i = 0; i < image.depth().size(); ++i) {
+    const std::uint16_t raw = image.depth()[i];
+    out[i] = is_measured(raw) ? static_cast<float>(raw / image.units_per_metre())
+                              : std::numeric_limits<float>::quiet_NaN();
+  }
+  return metres;
+}
+
+void define_depth_images(py::module_& m) {
   py::class_<DepthImage, Cloud, std::shared_ptr<DepthImage>>(
       m, "DepthImage", "One capture of a depth camera: 16-bit depth, touched in place.")
       .def(
@@ -315,29 +351,12 @@ void define_clouds(py::module_& m) {
           "the same shape and in the depth's own unit, is the standard deviation of each reading, "
           "finite and 0 or more, also where depth has holes; it is kept to a 16th of the unit. "
           "Without it the noise is that of the sensor type. All are copied.")
-      .def_property_readonly(
-          "depth",
-          [](const py::object& self) {
-            const auto& image = py::cast<const DepthImage&>(self);
-            py::array_t<std::uint16_t> view({image.intrinsics().height, image.intrinsics().width},
-                                            image.depth().data(), self);
-            view.attr("setflags")(py::arg("write") = false);
-            return view;
-          },
-          "uint16 (height, width), not to be written to: the image's own memory")
+      .def_property_readonly("depth", &depth_view,
+                             "uint16 (height, width), not to be written to: the image's own memory")
       .def_property_readonly("camera",
                              [](const DepthImage& image) { return Camera{image.shared_rays()}; })
       .def_property_readonly(
-          "noise",
-          [](const DepthImage& image) -> std::optional<Singles> {
-            if (!image.noise()) return std::nullopt;
-            Singles noise({image.intrinsics().height, image.intrinsics().width});
-            std::transform(image.noise()->begin(), image.noise()->end(), noise.mutable_data(),
-                           [](std::uint16_t steps) {
-                             return static_cast<float>(steps / DepthImage::noise_steps);
-                           });
-            return noise;
-          },
+          "noise", &noise_of,
           "float32 (height, width), standard deviations in the depth's own unit, as they are kept; "
           "None: not known")
       .def_property_readonly("units_per_metre", &DepthImage::units_per_metre)
@@ -347,24 +366,14 @@ void define_clouds(py::module_& m) {
             return Eigen::Matrix4d(image.world_from_camera().matrix());
           },
           "4x4, the camera's optical frame in the world [m]")
-      .def(
-          "metres",
-          [](const DepthImage& image) {
-            const Intrinsics& k = image.intrinsics();
-            py::array_t<float> metres({k.height, k.width});
-            float* out = metres.mutable_data();
-            for (std::size_t i = 0; i < image.depth().size(); ++i) {
-              const std::uint16_t raw = image.depth()[i];
-              out[i] = is_measured(raw) ? static_cast<float>(raw / image.units_per_metre())
-                                        : std::numeric_limits<float>::quiet_NaN();
-            }
-            return metres;
-          },
-          "Depth [m] as float32 (height, width), NaN where nothing was measured.")
+      .def("metres", &metres_of,
+           "Depth [m] as float32 (height, width), NaN where nothing was measured.")
       .def(
           "points", [](const DepthImage& image) { return rows_of(image.points()); },
           "All measured points [m, world], an array (n, 3).");
+}
 
+void define_points(py::module_& m) {
   py::class_<PointCloud, Cloud, std::shared_ptr<PointCloud>>(
       m, "PointCloud", "Points in no particular order, sorted once.")
       .def(py::init(&make_points), py::arg("points"), py::arg("viewpoint") = py::none(),
@@ -381,7 +390,7 @@ void define_clouds(py::module_& m) {
           "All finite points [m, world], an array (n, 3), sorted along a space-filling curve.");
 }
 
-void define_renderer(py::module_& m) {
+void define_ticks(py::module_& m) {
   py::enum_<ContactState>(m, "State", py::arithmetic(), "Where the proxy stands.")
       .value("FREE", ContactState::free_motion, "nothing within r_2")
       .value("CONTACT", ContactState::contact, "points between r_1 and r_2")
@@ -427,7 +436,9 @@ void define_renderer(py::module_& m) {
         return "<palpate.Tick t=" + std::to_string(tick.t) + " s, " + to_string(tick.state) +
                ", force " + std::to_string(tick.force.norm()) + " N>";
       });
+}
 
+void define_renderer(py::module_& m) {
   py::class_<Renderer>(
       m, "Renderer",
       "A method of haptic rendering: frames and HIPs in, proxy and force out.\n\n"
@@ -512,7 +523,12 @@ std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
 
 void define_core(py::module_& module) {
   define_tables(module);
+  define_cameras(module);
   define_clouds(module);
+  define_materials(module);
+  define_depth_images(module);
+  define_points(module);
+  define_ticks(module);
   define_renderer(module);
 }
 

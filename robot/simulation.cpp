@@ -164,11 +164,6 @@ std::optional<VisibleGeom> visible(const mjModel& model, int geom) {
                      model.geom_group[geom] == arm_group, model.body_weldid[body] == 0};
 }
 
-Vec3 limited(const Vec3& v, double most) {
-  const double length = v.norm();
-  return length > most ? Vec3(v * (most / length)) : v;
-}
-
 void check_range(double value, double least, double most, const std::string& what,
                  const std::string& unit) {
   if (!(value >= least && value <= most))
@@ -351,7 +346,7 @@ class Simulation::Implementation {
     const bool led = commanded_ && d.time - commanded_at_ < command_timeout;
     if (led != led_ && !led) {
       // Where the reference comes to rest from its velocity without overshoot.
-      goal_ = tip_position + limited(tip_velocity, setup_.max_speed) / reference_rate;
+      goal_ = tip_position + no_longer_than(tip_velocity, setup_.max_speed) / reference_rate;
       goal_velocity_.setZero();
       goal_turn_ = turned;
     }
@@ -361,10 +356,10 @@ class Simulation::Implementation {
 
     const Vec3 old_velocity = reference_velocity_;
     const Vec3 acceleration =
-        limited(reference_rate * (reference_rate * (goal_ - reference_) +
-                                  2.0 * (goal_velocity_ - reference_velocity_)),
-                max_acceleration);
-    reference_velocity_ = limited(old_velocity + acceleration * dt, setup_.max_speed);
+        no_longer_than(reference_rate * (reference_rate * (goal_ - reference_) +
+                                         2.0 * (goal_velocity_ - reference_velocity_)),
+                       max_acceleration);
+    reference_velocity_ = no_longer_than(old_velocity + acceleration * dt, setup_.max_speed);
     reference_ += reference_velocity_ * dt;
     Vec3 advance = (reference_velocity_ - old_velocity) / dt;
     Vec3 lead = reference_ - tip_position;
@@ -382,12 +377,12 @@ class Simulation::Implementation {
     const Vec3 old_spin = reference_spin_;
     const Vec3 left = rotation_vector(between(goal_turn_, reference_turn_));
     const Vec3 turning =
-        limited(reference_rate * (reference_rate * left - 2.0 * old_spin), max_turning);
-    reference_spin_ = limited(old_spin + turning * dt, max_spin);
+        no_longer_than(reference_rate * (reference_rate * left - 2.0 * old_spin), max_turning);
+    reference_spin_ = no_longer_than(old_spin + turning * dt, max_spin);
     reference_turn_ = unit(product(rotation_by(reference_spin_ * dt), reference_turn_));
     Vec3 turn = rotation_vector(between(reference_turn_, turned));
     if (turn.norm() > longest_turn) {
-      turn = limited(turn, longest_turn);
+      turn = no_longer_than(turn, longest_turn);
       reference_turn_ = unit(product(rotation_by(turn), turned));
       reference_spin_ = velocity.tail<3>();
     }
@@ -395,8 +390,8 @@ class Simulation::Implementation {
     feed_forward << advance, (reference_spin_ - old_spin) / dt;
     if (tip_force_.norm() > touching) feed_forward.setZero();
     Vector6 wrench = apparent_mass * feed_forward;
-    wrench.head<3>() +=
-        limited(spring * lead + damping * (reference_velocity_ - tip_velocity), setup_.max_force);
+    wrench.head<3>() += no_longer_than(
+        spring * lead + damping * (reference_velocity_ - tip_velocity), setup_.max_force);
     wrench.tail<3>() +=
         turn_stiffness * turn + turn_damping * (reference_spin_ - velocity.tail<3>());
 
@@ -515,7 +510,7 @@ class Simulation::Implementation {
     if (command == nullptr) return;
     goal_ = command->pose.position.cwiseMax(reach_.min()).cwiseMin(reach_.max());
     goal_turn_ = command->pose.orientation;
-    goal_velocity_ = limited(command->velocity, setup_.max_speed);
+    goal_velocity_ = no_longer_than(command->velocity, setup_.max_speed);
     for (int i = 0; i < 3; ++i) {
       if (goal_[i] != command->pose.position[i]) goal_velocity_[i] = 0.0;
     }

@@ -86,8 +86,8 @@ struct Row {
 };
 
 bench::MethodChoice choice_of(const BenchOptions& options) {
-  const MethodChoice choice = options.method.choice(standard_methods());
-  return {choice.name, choice.parameters};
+  const SessionConfig config = options.method.session(standard_methods());
+  return {config.method, config.parameters};
 }
 
 std::vector<Row> measure_all(const BenchOptions& options, const bench::MethodChoice& method) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -52,21 +53,14 @@ lab::RunnerOptions runner_options(int jobs, std::shared_ptr<Progress>& progress)
   return runner;
 }
 
-std::string now() {
-  const std::time_t time = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&time, &utc);
-  std::string text(20, '\0');
-  std::strftime(text.data(), text.size() + 1, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
-
 int enter(const EntryArguments& arguments) {
   lab::EntryOptions options = arguments.entry;
   options.seed = arguments.seed.value_or(by_chance());
   const Machine machine = look_at_machine();
   const lab::EntryRun run = {
-      {"date", now()}, {"processor", machine.processor}, {"compiler", __VERSION__}};
+      {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
+      {"processor", machine.processor},
+      {"compiler", __VERSION__}};
   std::shared_ptr<Progress> progress;
   lab::RunnerOptions runner = runner_options(arguments.jobs, progress);
   runner.resume = arguments.resume;

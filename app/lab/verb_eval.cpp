@@ -48,7 +48,7 @@ std::pair<int, int> parse_grid(const std::string& text) {
 
 lab::ExperimentOptions experiment_options(const EvalOptions& options) {
   lab::ExperimentOptions result = options.given;
-  result.parameters = options.parameters.choice(lab::methods()).parameters;
+  result.parameters = options.parameters.session(lab::methods()).parameters;
   if (options.seed < 0)
     throw Error("--seed " + std::to_string(options.seed), "it is negative",
                 "use a whole number from 0 on");

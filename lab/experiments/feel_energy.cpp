@@ -8,6 +8,7 @@
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/servo/passivity_observer.hpp"
 
 namespace palpate::lab {
@@ -77,17 +78,52 @@ class Meter {
   double sum_ = 0.0;
 };
 
+// Of the energies of all contacts.
+double all_but_a_hundredth(std::span<const double> energies) {
+  std::vector<double> sorted(energies.begin(), energies.end());
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[sorted.size() - 1 - sorted.size() / 100];
+}
+double percent_of_many(std::span<const double> energies) {
+  constexpr double much = 1e3 * PortEnergy::least_made;  // [mJ]
+  const auto many =
+      std::count_if(energies.begin(), energies.end(), [](double energy) { return energy > much; });
+  return 100.0 * static_cast<double>(many) / static_cast<double>(energies.size());
+}
+double number_of(std::span<const double> energies) { return static_cast<double>(energies.size()); }
+
+// Adds one repeat's contacts to those of each contestant, holding after holding.
+// @param meters  of each holding and hand, the ruler's and then the contestants'
+void count_energies(const std::vector<OwnMethod>& contestants, std::size_t hands,
+                    const std::vector<Meter>& meters, std::vector<FeelRepeats>& counted) {
+  const std::size_t group = 1 + contestants.size();
+  for (std::size_t h = 0; h < holdings.size(); ++h) {
+    for (std::size_t i = 0; i < hands; ++i) {
+      const std::size_t ruler = (h * hands + i) * group;
+      for (std::size_t m = 0; m < contestants.size(); ++m) {
+        FeelRepeats& energies = counted[m * holdings.size() + h];
+        const std::pair name(contestants[m].name, holdings[h].loop);
+        for (std::size_t c = 0; c < meters[ruler].made.size(); ++c) {
+          const double made = 1e3 * meters[ruler + 1 + m].made[c];
+          const double exact = 1e3 * meters[ruler].made[c];
+          energies.add(name, "above", made - exact);
+          energies.add(name, "made", made);
+          energies.add(name, "exact", exact);
+          // The exact surface's, above the same without the chain.
+          if (holdings[h].by_chain)
+            energies.add(name, "chain-above",
+                         1e3 * (meters[ruler].made[c] - meters[i * group].made[c]));
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 FeelFigures play_energy(const FeelOptions& options, double distance, const std::string& sensor) {
-  struct Counted {
-    std::vector<double> above;  // [mJ]
-    double sum = 0.0;           // [mJ]
-    double ruler = 0.0;         // [mJ] the same of the exact surface
-  };
-  std::vector<double> by_chain;  // [mJ] of the exact surface, above the same without the chain
-  std::vector<std::vector<Counted>> counted(options.contestants.size(),
-                                            std::vector<Counted>(holdings.size()));
+  const std::vector<OwnMethod>& contestants = options.contestants;
+  std::vector<FeelRepeats> counted(contestants.size() * holdings.size());  // [mJ]
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = options.seed_of(k);
     const FeelStage stage("synthetic:plane?" + camera_options(distance, 0.3, sensor, seed));
@@ -112,58 +148,25 @@ FeelFigures play_energy(const FeelOptions& options, double distance, const std::
           meters.emplace_back(hand.ends);
         };
         add(make_method("ideal", {options.parameters, truth}));
-        for (const OwnMethod& contestant : options.contestants)
+        for (const OwnMethod& contestant : contestants)
           add(contestant.make({options.parameters, truth}));
       }
     }
     play_to(loops, stage.scenario(duration + 0.01),
             [&](std::size_t loop, const Felt& felt) { meters[loop].add(felt); });
-    const std::size_t group = 1 + options.contestants.size();
-    for (std::size_t i = 0; i < hands.size(); ++i) {
-      const std::vector<double>& straight = meters[i * group].made;
-      const std::vector<double>& chain = meters[(3 * hands.size() + i) * group].made;
-      for (std::size_t c = 0; c < chain.size(); ++c)
-        by_chain.push_back(1e3 * (chain[c] - straight[c]));
-    }
-    for (std::size_t h = 0; h < holdings.size(); ++h) {
-      for (std::size_t i = 0; i < hands.size(); ++i) {
-        const std::size_t ruler = (h * hands.size() + i) * group;
-        for (std::size_t m = 0; m < options.contestants.size(); ++m) {
-          Counted& counts = counted[m][h];
-          for (std::size_t c = 0; c < meters[ruler].made.size(); ++c) {
-            const double made = 1e3 * meters[ruler + 1 + m].made[c];
-            const double exact = 1e3 * meters[ruler].made[c];
-            counts.sum += made;
-            counts.ruler += exact;
-            counts.above.push_back(made - exact);
-          }
-        }
-      }
-    }
+    count_energies(contestants, hands.size(), meters, counted);
   }
   FeelFigures figures;
-  for (std::size_t m = 0; m < options.contestants.size(); ++m) {
-    for (std::size_t h = 0; h < holdings.size(); ++h) {
-      Counted& counts = counted[m][h];
-      std::sort(counts.above.begin(), counts.above.end());
-      const auto n = counts.above.size();
-      const auto add = [&](std::string_view measure, double value) {
-        figures.push_back(
-            {options.contestants[m].name, holdings[h].loop, std::string(measure), value});
-      };
-      constexpr double much = 1e3 * PortEnergy::least_made;  // [mJ]
-      const auto many = std::count_if(counts.above.begin(), counts.above.end(),
-                                      [](double above) { return above > much; });
-      add("above", counts.above.back());
-      add("above-99%", counts.above[n - 1 - n / 100]);
-      add("above-median", counts.above[n / 2]);
-      add("over-0.1mJ", 100.0 * static_cast<double>(many) / static_cast<double>(n));
-      add("made", counts.sum / static_cast<double>(n));
-      add("exact", counts.ruler / static_cast<double>(n));
-      add("contacts", static_cast<double>(n));
-      if (holdings[h].by_chain)
-        add("chain-above", *std::max_element(by_chain.begin(), by_chain.end()));
-    }
+  for (const FeelRepeats& energies : counted) {
+    const FeelFigures more = energies.figures({{"above", largest},
+                                               {"above", all_but_a_hundredth, "above-99%"},
+                                               {"above", median, "above-median"},
+                                               {"above", percent_of_many, "over-0.1mJ"},
+                                               {"made", mean},
+                                               {"exact", mean},
+                                               {"above", number_of, "contacts"},
+                                               {"chain-above", largest}});
+    figures.insert(figures.end(), more.begin(), more.end());
   }
   return figures;
 }

@@ -151,8 +151,7 @@ std::string alarm_text(const Table& table, const std::string& method) {
   const double behind = total("time_behind_s");
   return fmt::format(
       "{}: behind for {:.1f} s of {:.0f} s, {:.1f} % of that flagged; false positives in {:.2f} "
-      "% "
-      "of the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
+      "% of the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
       method, behind, total("time_s"), behind > 0.0 ? 100.0 * total("alarmed_s") / behind : 100.0,
       100.0 * total("false_alarm_s") / std::max(total("time_s") - behind, 1e-3),
       total("quick_returns"), total("times_behind"));

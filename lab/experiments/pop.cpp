@@ -178,7 +178,10 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
 }
 
 std::vector<const PopFamily*> families_of(const ExperimentOptions& options) {
-  std::vector<const PopFamily*> families = find_pop_families(options.families);
+  std::vector<const PopFamily*> families;
+  for (const PopFamily& family : pop_families())
+    if (options.families.empty()) families.push_back(&family);
+  for (const std::string& name : options.families) families.push_back(&find_pop_family(name));
   for (const std::string& fixed : options.fixed) {
     const std::string key = fixed.substr(0, fixed.find('='));
     const bool known = std::any_of(families.begin(), families.end(), [&](const PopFamily* family) {

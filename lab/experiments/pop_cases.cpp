@@ -559,15 +559,6 @@ const PopFamily& find_pop_family(std::string_view name) {
   return find_named(families, name, "family", "there is no such family of cases");
 }
 
-std::vector<const PopFamily*> find_pop_families(std::span<const std::string> names) {
-  std::vector<const PopFamily*> found;
-  for (const std::string& name : names) found.push_back(&find_pop_family(name));
-  if (found.empty()) {
-    for (const PopFamily& family : families) found.push_back(&family);
-  }
-  return found;
-}
-
 PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t index) {
   Chance chance = chance_of(family.name, seed, index);
   PopCase c;

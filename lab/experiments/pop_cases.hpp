@@ -85,10 +85,6 @@ std::span<const PopFamily> pop_families();
 /// @throws Error for an unknown name, naming the nearest and listing all.
 const PopFamily& find_pop_family(std::string_view name);
 
-/// The families of these names; all of them if there are none.
-/// @throws Error for an unknown name.
-std::vector<const PopFamily*> find_pop_families(std::span<const std::string> names);
-
 /// Case number `index` of a family: from seed, family and index alone.
 PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t index);
 

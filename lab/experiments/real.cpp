@@ -114,14 +114,12 @@ Recording open_recording(const std::string& uri, std::size_t most = most_places)
   // At rest: half of what the last frame measured is within 8 mm of what the first did.
   const auto& a = first.depth();
   const auto& b = recording.frames.back()->depth();
-  std::vector<int> change;
+  std::vector<double> change;
   for (std::size_t i = 0; i < a.size(); i += 7) {
     if (is_measured(a[i]) && is_measured(b[i])) change.push_back(std::abs(int{a[i]} - int{b[i]}));
   }
   if (change.empty()) throw Error(uri, "its frames do not overlap", "give another recording");
-  std::nth_element(change.begin(), change.begin() + static_cast<std::ptrdiff_t>(change.size() / 2),
-                   change.end());
-  recording.at_rest = change[change.size() / 2] <= 0.008 * first.units_per_metre();
+  recording.at_rest = median(change) <= 0.008 * first.units_per_metre();
 
   const DepthImage image =
       recording.at_rest ? mean_of(recording.frames) : mean_of({recording.frames.front()});

@@ -62,10 +62,8 @@ std::string corners_rows(const std::string& name, const ExperimentOptions& optio
     const auto hit = scene->cast(Vec3(x, y, 1.0), -Vec3::UnitZ(), 0.0);
     return hit ? 1.0 - *hit : 0.0;
   };
-  GridCloud grid;
+  GridCloud grid = level_grid(r_c, 45.0 * r_c);
   grid.height = height;
-  grid.spacing = 0.3 * r_c;
-  grid.half_x = 45.0 * r_c;
   grid.half_y = 15.0 * r_c;
   const auto method = make_method(name, {options.parameters, truth_of(scene)});
   const double from = -38.0 * r_c;

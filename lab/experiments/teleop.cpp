@@ -162,9 +162,7 @@ TeleopScene teleop_scene(std::string_view name, std::string_view sensor, std::ui
       std::vector<Part>{{HalfSpace{}, Eigen::Isometry3d::Identity(), motion_of(name)}});
   const auto camera = camera_before(*scene, camera_options(distance, across, sensor, seed));
   TeleopScene played{
-      .cloud = [camera](std::uint64_t frame, double t) -> std::shared_ptr<const Cloud> {
-        return camera->capture(t, frame).cloud;
-      },
+      .cloud = [camera](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
       .truth = truth_of(scene),
       .hand = HipPath({{0.0, Vec3::Zero()}}),
       .duration = 0.0};

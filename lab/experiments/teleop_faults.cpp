@@ -126,9 +126,8 @@ TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
   const std::string_view sensor = 3.0 * chance() < 1.0 ? "ideal" : "d4xx";
   const auto camera = camera_before(*scene, camera_options(distance, across, sensor, seed));
   TeleopEpisode episode{
-      .scene = {.cloud = [camera](std::uint64_t frame, double t) -> std::shared_ptr<const Cloud> {
-                  return camera->capture(t, frame).cloud;
-                },
+      .scene = {.cloud = [camera](std::uint64_t frame,
+                                  double t) { return camera->capture(t, frame).cloud; },
                 .truth = truth_of(scene),
                 .hand = wander(chance),
                 .duration = episode_duration},

@@ -135,8 +135,7 @@ struct Felt {
   double longest = 0.0;  // [s]
 };
 
-Felt play(const PressCase& one, const ToolShape& shape, SyntheticCamera& camera,
-          ToolMethod& method) {
+Felt play(const PressCase& one, const ToolShape& shape, SyntheticCamera& camera, Method& method) {
   Felt felt;
   double behind = 0.0;  // [s]
   std::uint64_t frames = 0;
@@ -145,7 +144,10 @@ Felt play(const PressCase& one, const ToolShape& shape, SyntheticCamera& camera,
     const double t = i * period;
     const HandPose hand = hand_at(one, t);
     const double due = static_cast<double>(frames) / camera.setup().frame_rate;
-    if (t >= due - 1e-9) method.take(frame = camera.capture(due, frames++), hand.position);
+    if (t >= due - 1e-9) {
+      frame = camera.capture(due, frames++);
+      method.observe({*frame.cloud, frame.stamp});
+    }
     const Tick tick = method.tick(hand, t);
     bool inside = false;
     for (std::size_t k = 0; k < shape.points().size() && t >= 1.0 && !inside; k += 10) {

@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "lab/method.hpp"
+
 namespace palpate::lab {
 
 Part part(Shape shape, const Vec3& at, const Vec3& turn) {
@@ -80,18 +82,18 @@ class VoxelField {
   std::vector<double> depth_;  // [m]
 };
 
-class Penalty final : public ToolMethod {
+class Penalty final : public LabMethod {
  public:
   Penalty(std::shared_ptr<const ToolShape> shape, bool has_voxels)
-      : shape_(std::move(shape)), has_voxels_(has_voxels) {}
-  void take(const Frame& frame, const Vec3& place) override {
-    frame_ = frame;
-    if (has_voxels_) voxels_.take(*frame.cloud->image(), place, shape_->reach());
-  }
-  Tick tick(const HandPose& hand, double t) override {
-    Tick tick = free_tick(hand.position, t, 0);
+      : LabMethod(Parameters()), shape_(std::move(shape)), has_voxels_(has_voxels) {}
+  Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+  Tick tick(const HandPose& hand, double t) noexcept override {
+    const DepthImage& image = *seen()->image();
+    if (has_voxels_ && is_new_) voxels_.take(image, hand.position, shape_->reach());
+    is_new_ = false;
+    Tick tick = free(hand.position, t);
     tick.orientation = tick.proxy_orientation = hand.orientation;
-    const Seen seen{*frame_.cloud->image()};
+    const Seen view{image};
     double depths = 0.0, squares = 0.0;
     for (const auto& point : shape_->points()) {
       const Vec3 lever = hand.orientation * point.at;
@@ -102,7 +104,7 @@ class Penalty final : public ToolMethod {
         depth = behind;
         way = -gradient.normalized();
       } else {
-        depth = seen.behind(hand.position + lever).value_or(0.0);
+        depth = view.behind(hand.position + lever).value_or(0.0);
       }
       if (depth <= 0.0 || depth > deepest) continue;
       const Vec3 force = depth * way;
@@ -125,29 +127,19 @@ class Penalty final : public ToolMethod {
   }
 
  private:
+  void frame(const Cloud& /*all*/, double /*stamp*/) noexcept override { is_new_ = true; }
+
   std::shared_ptr<const ToolShape> shape_;
   bool has_voxels_;
-  Frame frame_;
+  bool is_new_ = false;  // the newest frame is not in the voxels yet
   VoxelField voxels_;
-};
-
-class Shaped final : public ToolMethod {
- public:
-  explicit Shaped(std::shared_ptr<const ToolShape> shape) : touch_(std::move(shape), {}) {}
-  void take(const Frame& frame, const Vec3& /*place*/) override {
-    touch_.observe({*frame.cloud, frame.stamp});
-  }
-  Tick tick(const HandPose& hand, double t) override { return touch_.tick(hand, t); }
-
- private:
-  ShapeTouch touch_;
 };
 
 }  // namespace
 
-std::unique_ptr<ToolMethod> make_tool_method(std::string_view name,
-                                             std::shared_ptr<const ToolShape> shape) {
-  if (name == "shape") return std::make_unique<Shaped>(std::move(shape));
+std::unique_ptr<Method> make_tool_method(std::string_view name,
+                                         std::shared_ptr<const ToolShape> shape) {
+  if (name == "shape") return std::make_unique<ShapeTouch>(std::move(shape), Parameters());
   return std::make_unique<Penalty>(std::move(shape), name == "voxels");
 }
 

@@ -13,22 +13,13 @@ namespace palpate::lab {
 /// What tools are touched with on the lab's benches: `shape` is ShapeTouch. Its peers are what is
 /// published more often: each point of the same shell that is behind the surface pushes by its
 /// depth, together as stiff as the coupling: along its inward normal (`penalty`), or out of a field
-/// of voxels (`voxels`).
-class ToolMethod {
- public:
-  virtual ~ToolMethod() = default;
-  /// A new frame. @param frame  must live until the next  @param place  [m] world, of the hand
-  virtual void take(const Frame& frame, const Vec3& place) = 0;
-  /// Where the method holds the tool is the tick's proxy: of a peer, which has none, where its
-  /// force and torque pull a hand to by the coupling's springs.
-  virtual Tick tick(const HandPose& hand, double t) = 0;
-};
-
+/// of voxels (`voxels`). They have no proxy: a tick's is where force and torque pull a hand to by
+/// the coupling's springs.
 inline constexpr std::array<std::string_view, 3> tool_methods{"shape", "penalty", "voxels"};
 
 /// @param name  one of `tool_methods`
-std::unique_ptr<ToolMethod> make_tool_method(std::string_view name,
-                                             std::shared_ptr<const ToolShape> shape);
+std::unique_ptr<Method> make_tool_method(std::string_view name,
+                                         std::shared_ptr<const ToolShape> shape);
 
 /// A body of a scene at a place [m], turned by a rotation vector [rad].
 Part part(Shape shape, const Vec3& at = Vec3::Zero(), const Vec3& turn = Vec3::Zero());

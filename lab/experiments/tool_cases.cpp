@@ -108,7 +108,7 @@ std::vector<ToolVerdict> play_tool_case(const ToolCase& one,
   model.seed = one.noise_seed;
   SyntheticCamera camera(Scene(seen), one.camera, model);
   const HipPath path(one.hand);
-  std::vector<std::unique_ptr<ToolMethod>> played;
+  std::vector<std::unique_ptr<Method>> played;
   std::vector<ToolJudge> judges(methods.size(), ToolJudge(one));
   for (const std::string_view method : methods)
     played.push_back(make_tool_method(method, one.tool));
@@ -122,7 +122,7 @@ std::vector<ToolVerdict> play_tool_case(const ToolCase& one,
     const Frame before = frame;  // it lives until all have the next
     if (is_new) frame = camera.capture(due, frames++);
     for (std::size_t m = 0; m < played.size(); ++m) {
-      if (is_new) played[m]->take(frame, hand.position);
+      if (is_new) played[m]->observe({*frame.cloud, frame.stamp});
       judges[m].add(played[m]->tick(hand, t), hand, t, frame.stamp);
     }
   }

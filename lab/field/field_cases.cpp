@@ -165,7 +165,9 @@ void plane_press(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift(place, pressing(draw, place.normal), start));
 }
 
-void slide_on(Draw& draw, Setting& setting, double start) {
+template <FieldScene (*scene)(Draw&)>
+void slide(Draw& draw, Setting& setting, double start) {
+  setting.scene = scene(draw);
   const Pressing p = pressing(draw, Vec3::UnitZ());
   constexpr double longest = 0.12;  // [m]
   const double length = draw.even("slide", 0.4 * longest, longest);
@@ -173,11 +175,6 @@ void slide_on(Draw& draw, Setting& setting, double start) {
   play_script(setting,
               stroke_and_lift(under_surface(setting.scene, heading, -0.5 * length, length, p.depth),
                               p.out, p, start, draw.by_factor("slide_speed", 0.08, 0.5)));
-}
-
-void plane_slide(Draw& draw, Setting& setting, double start) {
-  setting.scene = plane_scene(draw);
-  slide_on(draw, setting, start);
 }
 
 void plane_tap(Draw& draw, Setting& setting, double start) {
@@ -397,11 +394,6 @@ void torso_palpate(Draw& draw, Setting& setting, double start) {
   play_script(setting, script);
 }
 
-void terrain_slide(Draw& draw, Setting& setting, double start) {
-  setting.scene = terrain_scene(draw);
-  slide_on(draw, setting, start);
-}
-
 void belt_under(Draw& draw, Setting& setting, double start) {
   const double height = draw.even("box", 0.02, 0.06);
   const Vec3 half(draw.even("box_x", 0.035, 0.06), draw.even("box_y", 0.035, 0.06), 0.5 * height);
@@ -595,7 +587,7 @@ void lift_off(Draw& draw, Setting& setting, double start) {
 
 constexpr std::array classes = {
     FieldClass{"plane-press", "a plane seen at 0 to 70 degrees, pressed and left", plane_press},
-    FieldClass{"plane-slide", "the same, strokes of up to 0.5 m/s", plane_slide},
+    FieldClass{"plane-slide", "the same, strokes of up to 0.5 m/s", slide<plane_scene>},
     FieldClass{"plane-tap", "the same, quick taps and a press", plane_tap},
     FieldClass{"bowl-press", "the inside of a cup or a bowl", bowl_press, 0.5},
     FieldClass{"bowl-slide", "along the inside of a bowl, up its wall", bowl_slide, 0.5},
@@ -610,7 +602,7 @@ constexpr std::array classes = {
     FieldClass{"cloth-slide", "a stroke over such a cloth", cloth_slide, 0.9},
     FieldClass{"torso-rest", "a resting hand on a torso that breathes", torso_rest},
     FieldClass{"torso-palpate", "taps and strokes on it", torso_palpate},
-    FieldClass{"terrain-slide", "a stroke over bumps and hollows", terrain_slide, 0.9},
+    FieldClass{"terrain-slide", "a stroke over bumps and hollows", slide<terrain_scene>, 0.9},
     FieldClass{"belt-under", "a box arrives sideways under the hand, which then presses on it",
                belt_under, 0.8},
     FieldClass{"belt-beside", "a box arrives beside the pressing hand and stays", belt_beside, 0.8},

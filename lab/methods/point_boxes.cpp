@@ -14,6 +14,7 @@
 
 #include "lab/local_points.hpp"
 #include "lab/method.hpp"
+#include "lab/table.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -72,8 +73,7 @@ class PointBoxes final : public LabMethod {
     }
     cells_.clear();
     if (distances.empty()) return;
-    std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-    half_ = std::max(share_of_spacing * distances[distances.size() / 2], 1e-5);
+    half_ = std::max(share_of_spacing * median(distances), 1e-5);
     for (std::uint32_t i = 0; i < all.size(); ++i) cells_[key(all[i])].push_back(i);
   }
 

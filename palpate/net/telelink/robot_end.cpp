@@ -104,7 +104,7 @@ SetPointOptions set_point_of(const RobotInfo& info, const RobotEndOptions& optio
 
 }  // namespace
 
-RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
+RobotEnd::RobotEnd(std::shared_ptr<Robot> robot, const RobotEndOptions& options)
     : robot_(std::move(robot)),
       state_(first_of(*robot_)),
       regions_(regions_of(robot_->info(), options.fixtures)),

@@ -48,7 +48,7 @@ class RobotEnd {
   /// Waits up to 5 s for the robot's first state.
   /// @throws Error if the robot reports nothing, an option is out of range, a tool with a shape is
   ///         of a robot that does not turn, or DDS is missing.
-  RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
+  RobotEnd(std::shared_ptr<Robot> robot, const RobotEndOptions& options);
   ~RobotEnd();  ///< the robot rests
 
   /// Adds what the session here needs: its device, radius of the proxy, fixtures. Once.
@@ -72,7 +72,7 @@ class RobotEnd {
   void report(double now);
   void say(const std::string& fault);
 
-  std::unique_ptr<Robot> robot_;
+  std::shared_ptr<Robot> robot_;
   mutable std::mutex mutex_;  // of state_ and watches_
   RobotState state_;
   std::vector<ApproachWatch> watches_;  // one a camera

@@ -35,11 +35,6 @@ double share_of(double dt, double time) { return 1.0 - std::exp(-dt / time); }
 constexpr const char* in_a_surface =
     "the tool is in what the camera sees: move the arm until it is free";
 
-Vec3 no_longer_than(const Vec3& v, double longest) {
-  const double size = v.norm();
-  return size > longest ? Vec3(longest / size * v) : v;
-}
-
 Vec3 without_part_against(const Vec3& unit, const Vec3& v) {
   return v - std::min(v.dot(unit), 0.0) * unit;
 }
@@ -119,14 +114,8 @@ void SetPoint::follow(const HandPose& held, bool touches, const Vec3& force, dou
   held_.orientation = unit(product(rotation_by(share * turn), held_.orientation));
 }
 
-// Hazard: robot-collides, robot-presses, robot-struck
-SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool led,
-                               const Approach& comes, const Vec3& force) noexcept {
-  const Tick& tick = record.tick;
-  const double since = began_ ? tick.t - last_t_ : 0.0;
-  const double dt = std::clamp(since, 0.0, 0.02);
-  last_t_ = tick.t;
-  const bool touches = tick.state != ContactState::free_motion && tick.normal.squaredNorm() > 0.25;
+// The normal of what is touched, and how that and what comes have moved lately.
+void SetPoint::look(const Tick& tick, bool touches, const Approach& comes, double dt) noexcept {
   if (touches) normal_ = tick.normal.normalized();
   const bool goes_on = std::exchange(touched_, touches) && touches;
   usual_ += (goes_on ? share_of(dt, turn_time) : 1.0) * (normal_ - usual_);
@@ -143,7 +132,10 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
   clear_ = std::min(
       clear_deviations * comes.noise + options_.lag * lately_ + notice_time * touched_lately_,
       farthest_clear);
+}
 
+// Into what is touched, or away from it by `clear_`. @return [N] with which it is to press
+double SetPoint::press_by(const Vec3& press, bool touches, bool led, double dt) noexcept {
   double wanted = 0.0;
   double newtons = 0.0;
   double clear = touches ? clear_ : 0.0;
@@ -155,8 +147,11 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
     clear *= 1.0 - through;
   }
   depth_ += share_of(dt, press_time) * (wanted - clear - depth_);
+  return newtons;
+}
 
-  const Vec3 pushed = force.allFinite() ? force : Vec3::Zero();
+// From what pushes harder than the tool is to press.
+void SetPoint::retreat(const Vec3& pushed, double newtons, double dt) noexcept {
   const double size = pushed.norm();
   const double above = size - std::min(newtons + options_.unwanted_force, options_.max_force);
   if (above > 0.0)
@@ -164,6 +159,35 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
         no_longer_than(retreat_ + (retreat_speed * above * dt / size) * pushed, farthest_retreat);
   else
     retreat_ -= share_of(dt, return_time) * retreat_;
+}
+
+// Out of the way of what comes: farther at once; back, and to another side, slowly: where it comes
+// from is a noisy guess.
+void SetPoint::evade(Vec3 out, double dt) noexcept {
+  const double far = out_.norm();
+  if (far > 0.0) {
+    const Vec3 unit = out_ / far;
+    const double along = out.dot(unit);
+    const Vec3 aside = out - along * unit;
+    const double slowly = options_.contact_speed * dt;
+    out = std::max(along, far - slowly) * unit + no_longer_than(aside, slowly);
+    if (out.dot(unit) < 0.0) out.setZero();
+  }
+  out_ = out;
+}
+
+// Hazard: robot-collides, robot-presses, robot-struck
+SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool led,
+                               const Approach& comes, const Vec3& force) noexcept {
+  const Tick& tick = record.tick;
+  const double since = began_ ? tick.t - last_t_ : 0.0;
+  const double dt = std::clamp(since, 0.0, 0.02);
+  last_t_ = tick.t;
+  const bool touches = tick.state != ContactState::free_motion && tick.normal.squaredNorm() > 0.25;
+  look(tick, touches, comes, dt);
+  const double newtons = press_by(press, touches, led, dt);
+  const Vec3 pushed = force.allFinite() ? force : Vec3::Zero();
+  retreat(pushed, newtons, dt);
 
   // A stop takes the set-point back to the tool at once; so does the beginning.
   const bool stops = std::exchange(led_, led) && !led;
@@ -182,18 +206,9 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
     // Never into what is touched, by the image or by the robot's own force.
     Vec3 out = way_out(held_.position, comes, tick.t);
     if (touches) out = without_part_against(normal_, out);
+    const double size = pushed.norm();
     if (size > touching_force) out = without_part_against(pushed / size, out);
-    const double far = out_.norm();
-    if (far > 0.0) {
-      // Farther at once; back, and to another side, slowly: where it comes from is a noisy guess.
-      const Vec3 unit = out_ / far;
-      const double along = out.dot(unit);
-      const Vec3 aside = out - along * unit;
-      const double slowly = options_.contact_speed * dt;
-      out = std::max(along, far - slowly) * unit + no_longer_than(aside, slowly);
-      if (out.dot(unit) < 0.0) out.setZero();
-    }
-    out_ = out;
+    evade(out, dt);
     goal += out_ + retreat_;
   }
   goal += fixtures_

@@ -83,6 +83,10 @@ class SetPoint {
              const Vec3& force) noexcept;
 
  private:
+  void look(const Tick& tick, bool touches, const Approach& comes, double dt) noexcept;
+  double press_by(const Vec3& press, bool touches, bool led, double dt) noexcept;
+  void retreat(const Vec3& pushed, double newtons, double dt) noexcept;
+  void evade(Vec3 out, double dt) noexcept;
   void follow(const HandPose& held, bool touches, const Vec3& force, double dt) noexcept;
   [[nodiscard]] Vec3 way_out(const Vec3& place, const Approach& comes, double t) const noexcept;
 

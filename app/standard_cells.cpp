@@ -13,7 +13,7 @@ Cell open_scene(const std::string& uri) {
   auto camera = open_synthetic_camera(Uri(uri));
   const Vec3 begin(0.0, 0.0, 0.12);  // [m] above what scenes have in the middle
   // Of whoever leads it, and of whoever shows it frames.
-  const std::shared_ptr<SceneRobot> robot =
+  std::shared_ptr<SceneRobot> robot =
       open_scene_robot(std::make_shared<const Scene>(camera->scene()), begin, uri);
   const std::shared_ptr<std::unique_ptr<Source>> source =
       std::make_shared<std::unique_ptr<Source>>(std::move(camera));

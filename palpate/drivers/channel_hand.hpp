@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "palpate/drivers/reopener.hpp"
+#include "palpate/kernel/core/patch.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"
@@ -57,9 +58,7 @@ class ChannelHand : public Device {
     const double now = monotonic_now();
     if (forces_.take() != nullptr) written_ = now;
     const bool passes = enabled_.load(std::memory_order_acquire) && now - written_ <= beat_time;
-    const Vec3 force = passes ? forces_.taken_last() : Vec3::Zero();
-    const double size = force.norm();
-    return size > most ? Vec3(most / size * force) : force;
+    return passes ? no_longer_than(forces_.taken_last(), most) : Vec3(Vec3::Zero());
   }
 
   DeviceInfo info_;     // set before the constructor returns

@@ -706,19 +706,26 @@ TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
   }
 }
 
-TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
-  // 40 mm of bar before pixels 12.5 mm wide: no quadric describes so few points with two edges.
+// By a camera 0.75 m above the plane z = 0, with pixels 12.5 mm wide there.
+// @param depth  [m] along the axis, of a viewing ray
+template <class Depth>
+DepthImage coarse_from_above(const Depth& depth) {
   const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 39.5, .cy = 29.5};
   const auto rays = std::make_shared<ViewingRays>(k);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
   pose.translation() = Vec3(0, 0, 0.75);
-  std::vector<std::uint16_t> depth;
-  for (int v = 0; v < k.height; ++v) {
+  std::vector<std::uint16_t> readings;
+  for (int v = 0; v < k.height; ++v)
     for (int u = 0; u < k.width; ++u)
-      depth.push_back(std::abs(rays->ray(u, v).x()) * 0.75 <= 0.02 ? 7500 : 8500);
-  }
-  const DepthImage image(rays, depth, 1e4, pose);
+      readings.push_back(static_cast<std::uint16_t>(depth(rays->ray(u, v)) * 1e4));
+  return DepthImage(rays, std::move(readings), 1e4, pose);
+}
+
+TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
+  // 40 mm of bar before pixels 12.5 mm wide: no quadric describes so few points with two edges.
+  const DepthImage image = coarse_from_above(
+      [](const Vec2& ray) { return std::abs(ray.x()) * 0.75 <= 0.02 ? 0.75 : 0.85; });
   Sight sight = seated({0.004, 0.0, 0.05});
   Tick tick;
   for (int frame = 0; frame < 60; ++frame) {
@@ -732,29 +739,17 @@ TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
 TEST(Sight, RestsOnACanNarrowerThanItsDiscs) {
   // A can of 54 mm before pixels 12.5 mm wide: each disc also shows the table, 40 mm lower, and the
   // fit through both falls far below the table beside it, which is no occluder for that.
-  const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 39.5, .cy = 29.5};
-  const auto rays = std::make_shared<ViewingRays>(k);
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
-  pose.translation() = Vec3(0, 0, 0.75);
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0.0, 3e-3);
-  const auto shoot = [&] {
-    std::vector<std::uint16_t> depth;
-    for (int v = 0; v < k.height; ++v) {
-      for (int u = 0; u < k.width; ++u) {
-        const bool is_can = 0.75 * rays->ray(u, v).norm() <= 0.027;
-        depth.push_back(static_cast<std::uint16_t>(((is_can ? 0.75 : 0.79) + noise(random)) * 1e4));
-      }
-    }
-    return DepthImage(rays, std::move(depth), 1e4, pose);
+  const auto depth = [&](const Vec2& ray) {
+    return (0.75 * ray.norm() <= 0.027 ? 0.75 : 0.79) + noise(random);
   };
   Sight sight = seated({0, 0, 0.05});
   std::vector<DepthImage> images;  // as long as the frames are in use
   images.reserve(60);
   double mean = 0.0;  // [m] over the last second
   for (int frame = 0; frame < 60; ++frame) {
-    images.push_back(shoot());
+    images.push_back(coarse_from_above(depth));
     const Tick tick = live_through(sight, images.back(), frame * interval, [](double t) {
       return Vec3(0, 0, std::max(0.05 - 0.1 * t, -0.01));
     });

@@ -19,6 +19,12 @@ using Vec3 = Eigen::Vector3d;
 /// The part of `v` that is along a unit vector.
 inline Vec3 along(const Vec3& v, const Vec3& unit) noexcept { return v.dot(unit) * unit; }
 
+/// `v`, cut to a length.
+inline Vec3 no_longer_than(const Vec3& v, double longest) noexcept {
+  const double size = v.norm();
+  return size > longest ? Vec3(longest / size * v) : v;
+}
+
 inline Float3 narrow(const Vec3& v) noexcept {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }

@@ -55,6 +55,7 @@ void Feel::observe(const Observation& seen) noexcept {
   look_whether_to_feel();
 }
 
+// @param normal  [-] unit, of the force, which may lean off the surface's
 Feel::Movement Feel::move(const Tick& tick, const Vec3& normal) noexcept {
   const Vec3 motion = along(tick.surface_motion, normal);
   Movement movement;

@@ -494,7 +494,7 @@ void ShapeTouch::feel(const Pose& hand, double t, const Vec3& surface, Tick& tic
   for (std::size_t i = 0; i < held_.count; ++i) {
     const Contact& contact = contacts_[held_.limit[i]];
     const Vec3 force = parameters_.coupling.stiffness * whole_ * pushes_[i];
-    normals += force.dot(contact.fit.normal) * contact.fit.normal;
+    normals += along(force, contact.fit.normal);
     const Vec3 velocity = hand_velocity_at(contact.lever) -
                           along(seen_[contact.camera].velocity(t), contact.fit.normal);
     pushed[i] = {contact.patch, pose_.at + contact.lever, contact.lever, contact.fit.normal, force,

@@ -62,12 +62,6 @@ class Robot {
   [[nodiscard]] virtual std::optional<RobotState> state() = 0;
 };
 
-/// A vector, cut to a length.
-inline Vec3 no_longer_than(const Vec3& v, double longest) noexcept {
-  const double size = v.norm();
-  return size > longest ? Vec3(longest / size * v) : v;
-}
-
 /// How a simulated tool turns: a critically damped loop of 4 Hz, which nothing touches.
 struct SimulatedTurn {
   Rotation orientation = Rotation::Identity();  ///< world_from_tool

@@ -96,6 +96,30 @@ TEST(FusedImage, AveragesEachPixelOfAShapeThatIsNoQuadric) {
   EXPECT_LT(error(fused, valley, Vec3(0, 0, 2e-3)), 1.5 * sigma / std::sqrt(32.0));
 }
 
+// Depth is rounded to the pitch of the pixels, so that all of a slope at 45 degrees is rounded
+// alike: a median of it jumps by a good part of the step.
+TEST(FusedImage, KeepsALevelStillThatIsFinerThanTheStepOfDepth) {
+  constexpr int step = 60;  // units of depth: 1.2 mm
+  Camera camera;
+  FusedImage fused;
+  std::vector<std::unique_ptr<DepthImage>> images;
+  double level = 0.0;
+  std::array<double, 2> range{};
+  for (int i = 0; i < 160; ++i) {
+    const DepthImage& image = camera.shoot(valley, 0.5 * sigma);
+    std::vector<std::uint16_t> depth = image.depth().copy();
+    for (std::uint16_t& each : depth)
+      each = static_cast<std::uint16_t>((each + step / 2) / step * step);
+    images.push_back(std::make_unique<DepthImage>(image.shared_rays(), std::move(depth), 5e4,
+                                                  image.world_from_camera()));
+    observe(fused, *images.back(), i, Vec3(0, 0, 2e-3));
+    if (i < 32) continue;
+    level += fused.correction().z();
+    range = {std::min(range[0], level), std::max(range[1], level)};
+  }
+  EXPECT_LT(range[1] - range[0], 0.2e-3);
+}
+
 TEST(FusedImage, DoesNotTakeTheNoiseOfAPixelThatSaysItIsNoisyForAnotherSurface) {
   // A half of the valley has a tenth of the noise.
   std::array<double, 2> errors{};

@@ -844,6 +844,38 @@ TEST(Sight, IsLiftedByADomeThatSlidesInUnderAHandAtRest) {
   EXPECT_NEAR(z, cap + r_c, 2e-3);
 }
 
+// A hand slides along the floor up to a wall, both seen at 45 degrees by a camera whose noise is
+// the same over its window, and rests in the corner.
+TEST(Sight, TakesNoWallForAnOccluder) {
+  constexpr double window = 6e-3;  // [m]
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 3e-3);
+  const Overhead camera;
+  Sight sight = seated({-0.06, 0, 0.15});
+  std::vector<DepthImage> images;  // as long as the frames are in use
+  images.reserve(120);
+  Eigen::AlignedBox3d places;
+  for (int i = 0; i < 120; ++i) {
+    std::array<std::array<double, 60>, 60> blotches;
+    for (auto& row : blotches)
+      for (double& each : row) each = noise(random);
+    const auto cell = [](double at) {
+      return static_cast<std::size_t>(std::clamp(at / window + 30.0, 0.0, 59.0));
+    };
+    const auto height = [&](double x, double y) {
+      return std::abs(x) + blotches[cell(x)][cell(y)];
+    };
+    images.push_back(camera.shoot(height, 0.0, random));
+    const Tick tick = live_through(sight, images.back(), i * interval, [](double t) {
+      const double x = -std::max(0.06 - 0.05 * std::max(t - 0.3, 0.0), 0.0);
+      return Vec3(x, 0, -x + std::max(0.03 - 0.1 * t, -8e-3));
+    });
+    if (i >= 80) places.extend(tick.proxy);
+  }
+  EXPECT_LT(places.sizes().maxCoeff(), 2e-3);
+  EXPECT_NEAR(places.center().z(), r_c * std::sqrt(2.0), 1e-3);
+}
+
 TEST(Sight, StopsAtARiserThatTheCameraDoesNotSee) {
   constexpr double rise = 26e-3;      // [m]
   constexpr double slow = 1.0 / 6.0;  // [s] between frames, in which the hand slides 10 mm

@@ -16,10 +16,9 @@ constexpr float most_missed = 3.0F;
 constexpr std::size_t least_pixels = 8;  // that measure a level
 // The spread is that of a region wider than the one that measures the level, as noise correlates.
 constexpr double spread_region = 3.0;
-// [-] Of a level's pixels at least this share lies within so many spreads of it. Where fewer do,
-// another surface came in beside the first, and no level is common to both.
-constexpr double least_share = 0.7;
-constexpr float most_deviation = 4.0F;
+// [-] Where fewer of the pixels are near the level, another surface came in beside the first, and
+// none is common to both.
+constexpr float least_share = 0.7F;
 constexpr int most_across = 16;         // pixels that are looked at, along either axis
 constexpr double farthest_pixel = 1e6;  // [px] beyond any image
 
@@ -66,8 +65,8 @@ void FusedImage::move_to(int u, int v) noexcept {
   }
 }
 
-// The newest frame's level: the median of what pixels within `radius` [px] of (u, v) are above
-// their relief. False if there are too few.
+// The newest frame's level, of the pixels within `radius` [px] of (u, v). False if there are too
+// few.
 bool FusedImage::find_level(int u, int v, double radius) noexcept {
   std::array<float, std::size_t{most_across + 2} * (most_across + 2)> values;
   double noise = 0.0;
@@ -92,13 +91,9 @@ bool FusedImage::find_level(int u, int v, double radius) noexcept {
   };
   const std::span<float> near = look(radius);
   if (near.size() < least_pixels) return false;
-  newest_ = kth_smallest(near, near.size() / 2);
-  if (spread_ > 0.0F) {
-    const auto fits = std::count_if(near.begin(), near.end(), [this](float value) {
-      return std::abs(value - newest_) <= most_deviation * spread_;
-    });
-    if (static_cast<double>(fits) < least_share * static_cast<double>(near.size())) return false;
-  }
+  const Level level = level_of(near, spread_);
+  if (level.share < least_share) return false;
+  newest_ = level.height;
   const std::span<float> wide = look(spread_region * radius);
   if (wide.size() < least_pixels) return false;
   spread_ = next_spread(spread_, newest_, wide, image_->units_per_metre());

@@ -10,6 +10,31 @@
 
 namespace palpate {
 
+/// Where a frame's points are, above their relief.
+struct Level {
+  float height;  ///< [m]
+  float share;   ///< [-] of the points that are near it
+};
+
+/// The mean of the points near their median: where depth is rounded, a median alone jumps by a good
+/// part of the step.
+/// @param heights  [m] of a frame's points above their relief; at least one
+/// @param spread   [m] of them so far; 0: not known yet
+inline Level level_of(std::span<const float> heights, float spread) noexcept {
+  constexpr float near = 4.0F;  // [-] spreads
+  const float median = kth_smallest(heights, heights.size() / 2);
+  if (spread == 0.0F) return {median, 1.0F};
+  float sum = 0.0F;
+  float count = 0.0F;  // the median's at least
+  for (const float height : heights) {
+    const float off = height - median;
+    const bool counts = std::abs(off) <= near * spread;
+    sum += counts ? off : 0.0F;
+    count += counts ? 1.0F : 0.0F;
+  }
+  return {median + sum / count, count / static_cast<float>(heights.size())};
+}
+
 /// [m] The spread of points about their level and relief, after one frame more.
 /// @param spread           [m] before; 0: this is the first frame
 /// @param level            [m] of the frame

@@ -85,6 +85,8 @@ Vec3 Sight::surface_velocity(double t) const noexcept {
 
 // [frames] A fit may describe what is none by chance: after so many on it points are forgotten.
 constexpr int most_frames_on_fit = 8;
+// A proxy does not touch the bottom of a trough much narrower than itself, but its flanks.
+constexpr double narrowest_trough = 0.7;  // [-] r_c times curvature
 
 // Averages the newest frame's points into those of its camera while the proxy rests on them, or
 // would where it is about to touch.
@@ -95,7 +97,10 @@ void Sight::fuse(const Observation& seen, SightTracker::Event event) noexcept {
   const SurfaceEstimate& surface = contact_.tracker.surface();
   const Proxy& proxy = contact_.proxy;
   const bool touching = touches(mode()) && proxy.normal;
-  const bool is_fitted = rests_on_fit(mode()) || (!touching && surface.smooth());
+  // The fit of a concave corner may become one that no proxy rests on in any frame.
+  const bool is_trough =
+      surface.surface().strongest_rise() * parameters_.proxy.r_c() > 0.5 * narrowest_trough;
+  const bool is_fitted = !is_trough && (rests_on_fit(mode()) || (!touching && surface.smooth()));
   contact_.frames_on_fit = is_fitted ? contact_.frames_on_fit + 1 : 0;
   if (image == nullptr || event != SightTracker::Event::followed ||
       contact_.frames_on_fit > most_frames_on_fit) {
@@ -174,13 +179,14 @@ bool Sight::is_near_fit(const Vec3& place, double t) const noexcept {
 // Rests the proxy on the fit, or frees it from there. False if the fit does not say where it is.
 bool Sight::rest_on_fit(const Vec3& hip, double t, Movement& movement) noexcept {
   constexpr int most_slides = 6;
-  // A proxy does not touch the bottom of a trough much narrower than itself, but its flanks.
-  constexpr double deepest = 0.7;  // [-] r_c times curvature
+  // Hysteresis, so that the way to rest does not change from tick to tick.
+  const double narrowest = (rests_on_fit(mode()) ? 1.0 : 0.7) * narrowest_trough;
   const double r_c = parameters_.proxy.r_c();
   SightTracker& tracker = contact_.tracker;
   for (int slides = 0; tracker.smooth();) {
     const SurfaceContact contact = tracker.contact(hip, t);
-    if (!is_near_fit(hip, t) || contact.curvature * r_c > deepest || !tracker.faces(contact.normal))
+    if (!is_near_fit(hip, t) || contact.curvature * r_c > narrowest ||
+        !tracker.faces(contact.normal))
       return false;
     if (contact.at_limit && !tracker.holding()) {
       if (slides == most_slides) movement.flags |= step_budget_hit;

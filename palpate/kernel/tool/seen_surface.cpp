@@ -281,7 +281,7 @@ void SeenSurface::aim_at(const Aim& aim) noexcept {
         start_cell(x, y);
 }
 
-// The newest frame's level (5): the median of what cells are above their relief. False: too few.
+// The newest frame's level (5). False: too few cells are known.
 bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) noexcept {
   const Cells& all = cells_[0];
   const Vec3 p = in_camera(aim.place);
@@ -308,7 +308,7 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
   }
   if (size < least_cells || 2 * size < known) return false;
   const std::span<float> near(values.data(), size);
-  newest_ = kth_smallest(near, size / 2);
+  newest_ = level_of(near, spread_).height;
   spread_ = next_spread(spread_, newest_, near, image_->units_per_metre());
   mean_noise_ = noise / static_cast<double>(size);
   // How much one frame's level varies: by second differences, which no steady motion changes.

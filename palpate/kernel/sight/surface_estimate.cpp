@@ -507,12 +507,15 @@ void SurfaceEstimate::average_shape(std::size_t j, const Vec2& foot, const ByCam
   Shape::Sums sums = Shape::Sums::Zero();
   std::array<SlopeWindow, slope_windows> windows;
   std::size_t filled = 0;
+  std::size_t whole = 0;
   std::size_t n = 0;
   for (; n < averaged; ++n) {
     const Evidence& e = evidence(n);
     if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
+    // A partly hidden disc determines the height, but hardly the slope.
+    if (!e.whole && n > 0) continue;
     sums += discs.worth[n] / doubts[e.camera] * e.shape[j].sums;
-    if (n + 1 == std::size_t{2} << filled && filled < slope_windows) {
+    if (++whole == std::size_t{2} << filled && filled < slope_windows) {
       windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
     }
   }

@@ -846,7 +846,7 @@ TEST(Sight, IsLiftedByADomeThatSlidesInUnderAHandAtRest) {
 
 // A hand slides along the floor up to a wall, both seen at 45 degrees by a camera whose noise is
 // the same over its window, and rests in the corner.
-TEST(Sight, TakesNoWallForAnOccluder) {
+TEST(Sight, RestsStillInACornerThatItSlidInto) {
   constexpr double window = 6e-3;  // [m]
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 3e-3);

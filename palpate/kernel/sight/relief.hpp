@@ -3,9 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <span>
 
+#include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/sight/surface_fit.hpp"
 
 namespace palpate {
@@ -24,15 +27,13 @@ inline Level level_of(std::span<const float> heights, float spread) noexcept {
   constexpr float near = 4.0F;  // [-] spreads
   const float median = kth_smallest(heights, heights.size() / 2);
   if (spread == 0.0F) return {median, 1.0F};
-  float sum = 0.0F;
-  float count = 0.0F;  // the median's at least
-  for (const float height : heights) {
-    const float off = height - median;
-    const bool counts = std::abs(off) <= near * spread;
-    sum += counts ? off : 0.0F;
-    count += counts ? 1.0F : 0.0F;
-  }
-  return {median + sum / count, count / static_cast<float>(heights.size())};
+  const auto [sum, count] = sums_over<2>(heights.size(), [&](std::size_t i) {
+    const float off = heights[i] - median;
+    const bool counts = std::abs(off) <= near * spread;  // the median's own does
+    return std::array{counts ? double{off} : 0.0, counts ? 1.0 : 0.0};
+  });
+  return {median + static_cast<float>(sum / count),
+          static_cast<float>(count / static_cast<double>(heights.size()))};
 }
 
 /// [m] The spread of points about their level and relief, after one frame more.

@@ -10,7 +10,7 @@
 namespace palpate::test {
 
 /// A device whose hand is where the test puts it and which keeps what it was told.
-class FakeDevice final : public Device {
+class FakeDevice : public Device {
  public:
   explicit FakeDevice(const DeviceLimits& limits = {}) { info_.limits = limits; }
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }

@@ -432,6 +432,8 @@ Json report_json(const DeviceInfo& info, const DeviceMeasurement& found,
                  {"update_rate_hz", number(found.update_rate)},
                  {"largest_force_n", found.largest_force},
                  {"farthest_m", found.farthest},
+                 {"stalls", found.stalls},
+                 {"longest_stall_s", found.longest_stall},
                  {"proposal", nullptr}};
   if (proposal) {
     report["proposal"] = {{"rate_hz", proposal->rate},
@@ -471,6 +473,7 @@ std::string report_text(const Json& report) {
   line("update_rate_hz", "position updates", 1.0, "a second");
   line("largest_force_n", "largest test force", 1.0, "N");
   line("farthest_m", "largest displacement of the handle", 1e3, "mm");
+  if (report["stalls"] != 0) line("longest_stall_s", "longest stall of this computer", 1e3, "ms");
   text += "\n";
   if (const Json& proposal = report["proposal"]; !proposal.is_null()) {
     text += fmt::format(

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measuring a device by its own motors, against the simulated devices, whose truth is known.
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "palpate/io/devices/device_body.hpp"
 #include "palpate/io/devices/device_probe.hpp"
 #include "palpate/io/devices/devices.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/errors.hpp"
 
@@ -27,9 +32,15 @@ std::unique_ptr<Device> opened(const std::string& options) {
 // A handle with a constant force on it, such as its weight; and what else a test does to it.
 class Wrapped final : public Device {
  public:
-  explicit Wrapped(const std::string& options) : inner_(opened(options)) {}
-  [[nodiscard]] const DeviceInfo& info() const override { return inner_->info(); }
+  explicit Wrapped(const std::string& options) : inner_(opened(options)), info_(inner_->info()) {}
+  // Measured as a real device is: in real time, by a loop of its own thread.
+  void be_live() { info_.simulated = false; }
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double t) noexcept override {
+    if (hang > 0.0 && (was_pushed || !breaks)) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(hang));
+      if (breaks) faulty_from = t, hang = 0.0;
+    }
     HandState hand = inner_->read(t);
     if (t > absent_from) hand.present = false;
     if (t > jumps_at) hand.position.x() += jump;
@@ -38,6 +49,7 @@ class Wrapped final : public Device {
   }
   void write(const Vec3& force, double t) noexcept override {
     largest = std::max(largest, force.norm());
+    if (largest > 0.1) was_pushed = true;
     last = force;
     if (t > absent_from + 0.01 || t > faulty_from + 0.01 || t > jumps_at + 0.01)
       largest_after = std::max(largest_after, force.norm());
@@ -51,9 +63,13 @@ class Wrapped final : public Device {
   double jump = 0.0;                                            // [m]
   double largest = 0.0, largest_after = 0.0;                    // [N]
   Vec3 last = Vec3::Ones();
+  double hang = 0.0;    // [s] that a read takes
+  bool breaks = false;  // the first such read comes when it is pushed; then it is faulty
+  std::atomic<bool> was_pushed{false};
 
  private:
   std::unique_ptr<Device> inner_;
+  DeviceInfo info_;
 };
 
 TEST(MeasureDevice, FindsWhatSimulatedDevicesAreMadeOf) {
@@ -171,6 +187,67 @@ TEST(MeasureDevice, EndsWithoutAForceWhenTheHandleGoesTooFarOrTheDeviceLetsGo) {
   EXPECT_NE(found.ended.find("the handle"), std::string::npos) << found.ended;
   EXPECT_LE(falling.largest, 0.45 + 1e-12);
   EXPECT_FALSE(propose(falling.info(), found));
+}
+
+const std::string too_busy = "the computer was too busy";
+
+// Measures in real time, with `prepare`d devices, until the stall that the test makes has come: a
+// busy computer may stall before, which has to be said, too.
+DeviceMeasurement measured_with_a_stall(
+    const std::function<std::function<bool()>(Wrapped&, ProbeOptions&)>& prepare) {
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    Wrapped device("device=touch&grip=none");
+    device.be_live();
+    ProbeOptions options;
+    const std::function<bool()> has_stalled = prepare(device, options);
+    try {
+      DeviceMeasurement found = measure_device(device, options);
+      EXPECT_NE(found.ended.find(too_busy), std::string::npos) << found.ended;
+      EXPECT_TRUE(device.last.isZero());
+      EXPECT_FALSE(propose(device.info(), found));
+      if (has_stalled()) return found;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(too_busy), std::string::npos) << error.what();
+    }
+  }
+  ADD_FAILURE() << "the machine stood still in each attempt";
+  return {};
+}
+
+TEST(MeasureDevice, SaysThatTheMeasuringThreadStalled) {
+  const DeviceMeasurement found = measured_with_a_stall([](Wrapped& device, ProbeOptions& options) {
+    const auto stalls = std::make_shared<int>(0);
+    options.cancelled = [&device, stalls] {
+      if (device.was_pushed) {
+        ++*stalls;
+        std::this_thread::sleep_for(std::chrono::milliseconds(350));
+      }
+      return *stalls > 3;
+    };
+    return [stalls] { return *stalls > 0; };
+  });
+  EXPECT_GE(found.stalls, 1);
+  EXPECT_GE(found.longest_stall, 0.35);
+  ASSERT_FALSE(found.doubts.empty());
+  EXPECT_NE(found.doubts.back().find("end other programs"), std::string::npos);
+}
+
+// As the watchdog of a firmware does.
+TEST(MeasureDevice, SaysThatADeviceFailedAfterAStall) {
+  const DeviceMeasurement found = measured_with_a_stall([](Wrapped& device, ProbeOptions&) {
+    device.hang = 0.03;
+    device.breaks = true;
+    return [&device] { return device.hang == 0.0; };
+  });
+  EXPECT_NE(found.ended.find("cool"), std::string::npos) << found.ended;
+}
+
+TEST(MeasureDevice, SaysThatStallsNeverLetTheForceRise) {
+  Wrapped device("device=touch&grip=none");
+  device.be_live();
+  device.hang = 0.03;
+  EXPECT_TRUE(fails_saying([&] { return measure_device(device); }, too_busy, "gives no force",
+                           "end other programs"));
 }
 
 // Hazard: probe

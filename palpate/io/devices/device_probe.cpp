@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "palpate/io/devices/device_body.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -27,6 +28,7 @@ constexpr double stuck_time = 1.0;    // [s] one way: it does not move
 constexpr int swings = 14;            // a stretch
 constexpr double ready_time = 5.0;    // [s] until the device gives forces
 constexpr double frame_time = 10e-3;  // [s] between two signs of life of the measuring thread
+constexpr double pause_time = 0.1;    // [s] without one: the force fades
 constexpr std::size_t window = 8;     // ticks of which the speed is the mean
 // A force, and where it turns. Several speeds tell friction from damping; a force that is weaker
 // for a part of each way tells mass and delay.
@@ -206,10 +208,57 @@ ServoSettings settings_of(const ProbeOptions& options) {
   settings.safety.max_force = options.force;
   settings.safety.ramp_time = 0.05;
   settings.safety.max_speed = 1.5;  // the exciter ends it long before
-  settings.safety.fade_age = 0.1;
+  settings.safety.fade_age = pause_time;
   settings.safety.lost_age = 0.2;
   return settings;
 }
+
+// When the computer was too busy. A tick that takes long may be the driver's doing as well.
+class Stalls {
+ public:
+  void add(const ServoTick& tick) {
+    const double gap = tick.tick.t - std::exchange(last_tick_, tick.tick.t);
+    if ((tick.safety & stalled) == 0) return;
+    const bool was_woken_late = 2e-9 * tick.wake_up_ns > gap;
+    keep({tick.tick.t, gap,
+          was_woken_late ? "the computer was too busy: the servo loop stood still for "
+                         : "the computer was too busy, or the driver too slow: a tick took "});
+  }
+  // The measuring thread runs again, at `now`, after `time` [s].
+  void add_pause(double now, double time) {
+    if (time > pause_time)
+      keep({now, time, "the computer was too busy: the measurement stood still for "});
+  }
+
+  [[nodiscard]] int count() const { return count_; }
+  [[nodiscard]] double longest() const { return longest_; }  // [s]
+  // Did one end or forbid what ended at t? The force would have been back.
+  [[nodiscard]] bool explain(double t) const { return count_ > 0 && t - last_ < memory; }
+  [[nodiscard]] std::string text() const {
+    return worst_.text + rounded(1e3 * worst_.length, 0) + " ms";
+  }
+
+ private:
+  static constexpr double memory = 1.0;  // [s]
+  struct Stall {
+    double t;       // [s] when it ended
+    double length;  // [s]
+    const char* text;
+  };
+
+  void keep(const Stall& stall) {
+    if (count_++ == 0 || stall.length > worst_.length || stall.t - worst_.t > memory)
+      worst_ = stall;
+    last_ = stall.t;
+    longest_ = std::max(longest_, stall.length);
+  }
+
+  Stall worst_{0.0, 0.0, ""};  // lately
+  int count_ = 0;
+  double last_ = 0.0;       // [s]
+  double longest_ = 0.0;    // [s]
+  double last_tick_ = 0.0;  // [s]
+};
 
 // What came of the ticks so far.
 class Watcher {
@@ -220,6 +269,7 @@ class Watcher {
   bool add(const ServoTick& tick) {
     constexpr std::uint32_t let_go =
         disengaged | input_refused | fault_latched | output_refused | hand_too_fast;
+    stalls.add(tick);
     if (!allowed_) {
       if (tick.gain < 1.0 || (tick.safety & let_go) != 0) return true;
       allowed_ = true;
@@ -234,6 +284,7 @@ class Watcher {
       ended = fault != DeviceFault::none ? (text.empty() ? std::string(describe(fault)) : text)
                                          : "the device disengaged: it reports no hand, or the "
                                            "safety chain set the force to zero";
+      if (stalls.explain(tick.tick.t)) ended = stalls.text() + ", and then " + ended;
       exciter_.stop();
       return false;
     }
@@ -243,6 +294,7 @@ class Watcher {
   [[nodiscard]] bool allowed() const { return allowed_; }
 
   std::vector<HandleSample> samples;
+  Stalls stalls;
   std::string ended;
 
  private:
@@ -251,8 +303,13 @@ class Watcher {
   bool allowed_ = false;
 };
 
-[[noreturn]] void never_ready(Device& device) {
+[[noreturn]] void never_ready(Device& device, const Stalls& stalls, double now) {
   const std::string text = device.fault_text();
+  if (stalls.explain(now))
+    throw Error(device.info().uri,
+                stalls.text() + ", and then it gives no force" + (text.empty() ? "" : ": " + text),
+                "end other programs and measure again; if that does not help, check that the "
+                "device is switched on and calibrated");
   throw Error(device.info().uri, "it gives no force" + (text.empty() ? "" : ": " + text),
               "check that it is switched on and calibrated, and that its force is enabled");
 }
@@ -275,7 +332,7 @@ void run_simulated(Device& device, const ProbeOptions& options,
     cycle.run({.t = t});
     ServoTick tick;
     if (reader.try_pop(tick) && !watcher.add(tick)) break;
-    if (!watcher.allowed() && t > ready_time) never_ready(device);
+    if (!watcher.allowed() && t > ready_time) never_ready(device, watcher.stalls, t);
   }
   LastGate::write_zero(device, 0.0);
   device.disable();
@@ -289,29 +346,36 @@ void run_live(Device& device, const ProbeOptions& options, const std::shared_ptr
   const auto points = std::make_shared<NoPoints>();
   loop.cycle().put_frame(points, monotonic_now(), monotonic_now());
   loop.start();
-  const double began = monotonic_now();
-  double last_tick = began;
+  // [s] as this thread saw time pass: a computer that stands still makes no device silent
+  double waited = 0.0;
+  double silent = 0.0;
+  double before = monotonic_now();
   for (bool goes_on = true; goes_on;) {
     std::this_thread::sleep_for(std::chrono::duration<double>(frame_time));
     const double now = monotonic_now();
     loop.cycle().put_frame(points, now, monotonic_now());
+    watcher.stalls.add_pause(now, now - before);
+    const double passed = std::min(now - before, pause_time);
+    waited += passed;
+    silent += passed;
+    before = now;
     ServoTick tick;
     while (goes_on && reader.try_pop(tick)) {
       goes_on = watcher.add(tick);
-      last_tick = now;
+      silent = 0.0;
     }
     if (!goes_on) break;
     if (options.cancelled && options.cancelled()) {
       watcher.ended = "it was cancelled";
       break;
     }
-    if (now - last_tick > 1.0) {
+    if (silent > 1.0) {
       watcher.ended = "its loop stands still";
       break;
     }
-    if (!watcher.allowed() && now - began > ready_time) {
+    if (!watcher.allowed() && waited > ready_time) {
       loop.stop();
-      never_ready(device);
+      never_ready(device, watcher.stalls, now);
     }
   }
   exciter->stop();
@@ -423,6 +487,11 @@ void doubt(DeviceMeasurement& result) {
     result.doubts.push_back("it moved by " + rounded(1e3 * result.rest_drift, 1) +
                             " mm before any force was sent");
   if (!result.ended.empty()) result.doubts.push_back("it ended early: " + result.ended);
+  if (result.stalls > 0 && !result.doubts.empty())
+    result.doubts.push_back(
+        "the computer was too busy, which may be why: stalls: " + std::to_string(result.stalls) +
+        ", the longest of " + rounded(1e3 * result.longest_stall, 0) +
+        " ms; end other programs and measure again");
 }
 
 }  // namespace
@@ -439,6 +508,8 @@ DeviceMeasurement measure_device(Device& device, const ProbeOptions& options) {
     run_live(device, options, exciter, watcher);
   DeviceMeasurement result;
   result.ended = watcher.ended.empty() ? text_of(exciter->end(), options) : watcher.ended;
+  result.stalls = watcher.stalls.count();
+  result.longest_stall = watcher.stalls.longest();
   look_at_positions(watcher.samples, result);
   result.fit = fit_handle(watcher.samples);
   doubt(result);

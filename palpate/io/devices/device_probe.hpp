@@ -73,7 +73,9 @@ struct DeviceMeasurement {
   double tick_rate = 0.0;                  ///< [Hz] of the ticks as they were
   double largest_force = 0.0;              ///< [N] that was sent
   double farthest = 0.0;                   ///< [m] that the handle was moved from `start`
-  std::vector<std::string> doubts;         ///< why the figures may be wrong, a sentence each
+  int stalls = 0;                   ///< times that the loop or the measuring thread stood still
+  double longest_stall = 0.0;       ///< [s]
+  std::vector<std::string> doubts;  ///< why the figures may be wrong, a sentence each
 };
 
 /// Moves a handle that nobody holds, back and forth along each axis, by at most `force`, and fits
@@ -81,6 +83,9 @@ struct DeviceMeasurement {
 /// off, when the handle goes too far or too fast, when the device reports a fault or no hand, when
 /// `cancelled` says so, and when this thread or the loop hangs (ServoLoop; frames that it no longer
 /// gets). A simulated device is measured on a clock of its own, at once.
+///
+/// What a computer that was too busy has ended or spoiled is told from what the device did:
+/// `ended`, `doubts` and the error say so.
 ///
 /// Takes some 10 to 40 s. Ask the person beside the device first.
 /// @throws Error if the options are out of range, or the device has no motors, cannot be started or

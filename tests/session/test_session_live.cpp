@@ -425,13 +425,14 @@ TEST(LiveSession, GoesOnFeelingAStillPictureAndNotWhatAStoppedCameraSaw) {
   constexpr double slack = 0.05;    // [s]
   for (const bool is_live : {false, true}) {
     const auto captured = std::make_shared<std::atomic<double>>(0.0);  // [s] the last frame
+    const auto was_felt = std::make_shared<std::atomic<bool>>(false);
     const auto has_ended = std::make_shared<std::atomic<bool>>(false);
     SessionOptions options = patient(std::make_shared<Log>());
     options.safety.fade_age = 0.5 * lost_age;
     options.safety.lost_age = lost_age;
     options.open_cameras[0] = std::make_unique<test::MadeSource>(
         [=](int k) -> std::optional<Frame> {
-          if (k == (is_live ? 100 : 1)) {
+          if (is_live ? k >= 100 && (*was_felt || k >= 6000) : k >= 1) {
             *has_ended = true;
             return std::nullopt;
           }
@@ -451,6 +452,7 @@ TEST(LiveSession, GoesOnFeelingAStillPictureAndNotWhatAStoppedCameraSaw) {
         const bool is_late = *has_ended && tick.tick.t > *captured + lost_age + slack;
         (is_late ? is_felt_late : is_felt) |= !tick.force.isZero(0.0);
       }
+      *was_felt = is_felt;
       return is_felt_late || (*has_ended && last > *captured + 10.0 * lost_age);
     }));
     EXPECT_EQ(is_felt_late, !is_live);

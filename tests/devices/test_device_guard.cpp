@@ -197,20 +197,25 @@ TEST_F(DeviceGuard, ShowsTheDeviceAsItIsAndStatesAWatchdog) {
 TEST_F(DeviceGuard, PassesNoForceOfADisabledDevice) {
   const std::unique_ptr<Device> device = open();
   double t = 0.0;
+  int calls = 0;
+  const auto push = [&] { test::push(*device, ++calls % 8 < 4 ? 0.0 : 1.0, t += 1e-3); };
   const auto push_for = [&](int turns) {
     const int end = seen.writes + turns;
+    const int last = calls + turns;
     seen.largest = 0.0;
-    int calls = 0;
     wait_for([&] {
-      test::push(*device, ++calls % 8 < 4 ? 0.0 : 1.0, t += 1e-3);
-      return seen.writes >= end && calls > turns;
+      push();
+      return seen.writes >= end && calls > last;
     });
     return seen.largest.load();
   };
   EXPECT_EQ(push_for(50), 0.0);
   device->enable();
   EXPECT_TRUE(seen.enabled);
-  EXPECT_EQ(push_for(50), 1.0);
+  EXPECT_TRUE(wait_for([&] {
+    push();
+    return seen.largest == 1.0;
+  }));
   device->disable();
   EXPECT_TRUE(wait_for([&] { return !seen.enabled; }));
   push_for(2);

@@ -22,12 +22,12 @@ namespace palpate {
 namespace http = boost::beast::http;
 namespace websocket = boost::beast::websocket;
 
-// A connection on which nothing waits for longer than ten seconds.
+// A connection on which nothing waits for longer than a minute.
 inline boost::asio::ip::tcp::socket connect_to(boost::asio::io_context& context,
                                                std::uint16_t port) {
   boost::asio::ip::tcp::socket socket(context);
   socket.connect({boost::asio::ip::address_v4::loopback(), port});
-  const timeval patience{10, 0};
+  const timeval patience{60, 0};
   ::setsockopt(socket.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   return socket;
 }

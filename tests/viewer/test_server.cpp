@@ -68,7 +68,7 @@ class FakeHost final : public ViewerHost {
   // Waits for the next file's end.
   std::string next_file() {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::seconds(10), [&] { return !files_.empty(); });
+    changed_.wait_for(lock, std::chrono::minutes(1), [&] { return !files_.empty(); });
     if (files_.empty()) return "none";
     const std::string file = files_.front();
     files_.pop_front();
@@ -80,7 +80,7 @@ class FakeHost final : public ViewerHost {
   // The hand's place when it has been told `count` times; waits for it.
   std::optional<Vec3> hand_number(std::size_t count) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::seconds(10), [&] { return hands_.size() >= count; });
+    changed_.wait_for(lock, std::chrono::minutes(1), [&] { return hands_.size() >= count; });
     return hands_.size() >= count ? hands_[count - 1] : Vec3(Vec3::Constant(1e9));
   }
   std::size_t hands() {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <thread>
@@ -78,20 +79,38 @@ class Hands : public test::Program {
   }
 
   void send(int signal) const { kill(session_, signal); }
-  // Sends a signal that ends or stops the session in mid-contact, and waits until the device has
-  // `fallen` to no force. @param longest_gap  [s] between the device's commands meanwhile
+  // Sends a signal that ends or stops the session on `device` in mid-contact, and waits until the
+  // device has `fallen` to no `force`. @param longest_gap  [s] between the device's commands
+  // meanwhile
   // @return [s] from the last good tick on, which was up to a period before the signal, without
-  //         what the commands were late because the machine was
-  double reaction_to(int signal, std::atomic<double>& fallen, std::atomic<double>& longest_gap) {
+  //         what signal and commands were late because the machine was
+  double reaction_to(int signal, const std::string& device, const std::function<double()>& force,
+                     std::atomic<double>& fallen, std::atomic<double>& longest_gap) {
     constexpr double period = 1e-3;
-    longest_gap = 0.0;
-    const double sent = clock_now();
-    send(signal);
-    if (signal == SIGKILL) wait_for_end();
-    EXPECT_TRUE(reaches([&] { return fallen > sent; }));
-    const double time = fallen - (sent - period) - std::max(longest_gap - 5.0 * period, 0.0);
-    RecordProperty(signal == SIGKILL ? "killed_us" : "stopped_us", static_cast<int>(1e6 * time));
-    return time;
+    for (int attempt = 0; attempt < 10; ++attempt) {
+      if (!reaches([&] { return force() > 0.95 * limit; })) break;
+      longest_gap = 0.0;
+      const double before = clock_now();
+      send(signal);
+      const double sent = clock_now();
+      if (signal == SIGKILL) wait_for_end();
+      if (!reaches([&] { return force() == 0.0; })) break;
+      for (int i = 0; i < 500 && fallen <= before; ++i)  // it is told after the force
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      const double time = fallen - (sent - period) - std::max(longest_gap - 5.0 * period, 0.0);
+      if (fallen > before) {
+        RecordProperty(signal == SIGKILL ? "killed_us" : "stopped_us",
+                       static_cast<int>(1e6 * time));
+        return time;
+      }
+      // The hand had lifted, or a stall had taken the force off, before the signal came.
+      if (signal == SIGKILL)
+        start(device);
+      else
+        send(SIGCONT);
+    }
+    ADD_FAILURE() << "it was never in contact when the signal came";
+    return std::numeric_limits<double>::infinity();
   }
   void wait_for_end() {
     waitpid(session_, nullptr, 0);
@@ -155,11 +174,16 @@ TEST_F(ForceDimensionHands, GiveNoSuddenForceToAHandThatBeginsWithinTheSurface) 
 
 // Hazard: dead-process
 TEST_F(ForceDimensionHands, LetGoWhenTheProgramIsKilled) {
-  start("force-dimension:");
-  ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
-  send(SIGKILL);
-  wait_for_end();
-  EXPECT_GT(std::hypot(bench.force[0], bench.force[1], bench.force[2]), 0.5) << "it was killed so";
+  // The hand lifts once a second, and a stall takes the force off: it is to be killed with a force.
+  double force = 0.0;
+  for (int attempt = 0; attempt < 10 && force <= 0.5; ++attempt) {
+    start("force-dimension:");
+    ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
+    send(SIGKILL);
+    wait_for_end();
+    force = std::hypot(bench.force[0], bench.force[1], bench.force[2]);
+  }
+  EXPECT_GT(force, 0.5) << "it was killed so";
   EXPECT_EQ(bench.motor_force(bench.commanded + reaction), 0.0);
 }
 
@@ -252,13 +276,16 @@ TEST_F(TouchHands, TouchASlopeInTheDriversOwnCallback) {
 // Hazard: dead-process
 TEST_F(TouchHands, LetGoWhenTheProgramIsStoppedOrKilled) {
   start("touch:");
-  ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
-  EXPECT_LE(reaction_to(SIGSTOP, bench.fell, bench.longest_gap), reaction) << "by the guard";
+  const auto time_after = [&](int signal) {
+    return reaction_to(
+        signal, "touch:", [&] { return motor_force(); }, bench.fell, bench.longest_gap);
+  };
+  EXPECT_LE(time_after(SIGSTOP), reaction) << "by the guard";
   send(SIGCONT);
   ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
   EXPECT_LE(bench.largest_first, 0.25);
-  EXPECT_LE(reaction_to(SIGKILL, bench.fell, bench.longest_gap), reaction) << "by the guard";
-  EXPECT_TRUE(reaches([&] { return bench.closes == 1; }));
+  EXPECT_LE(time_after(SIGKILL), reaction) << "by the guard";
+  EXPECT_TRUE(reaches([&] { return bench.closes == bench.opens; }));
   EXPECT_EQ(motor_force(), 0.0);
 }
 
@@ -384,11 +411,13 @@ TEST_F(HaplyHands, FindTheFormOfTheCommandThatTheServiceTakes) {
 TEST_F(HaplyHands, LetGoWhenTheProgramIsStoppedOrKilled) {
   at(version) = 3.5;
   start(uri());
-  ASSERT_TRUE(reaches([&] { return force() > 0.95 * limit; }));
-  EXPECT_LE(reaction_to(SIGSTOP, at(fell), at(longest_gap)), reaction) << "by the guard";
+  const auto time_after = [&](int signal) {
+    return reaction_to(
+        signal, uri(), [&] { return force(); }, at(fell), at(longest_gap));
+  };
+  EXPECT_LE(time_after(SIGSTOP), reaction) << "by the guard";
   send(SIGCONT);
-  ASSERT_TRUE(reaches([&] { return force() > 0.95 * limit; }));
-  EXPECT_LE(reaction_to(SIGKILL, at(fell), at(longest_gap)), reaction) << "by the guard";
+  EXPECT_LE(time_after(SIGKILL), reaction) << "by the guard";
   EXPECT_EQ(force(), 0.0);
   EXPECT_LE(at(largest_first), 0.25);
 }
@@ -456,8 +485,15 @@ TEST_F(GamepadHands, AreRefusedInOneLineThatSaysWhatToDo) {
 // The fake arm goes where it wants, so nothing can be learned of it; but safely.
 TEST_F(ForceDimensionHands, AreMeasuredBelowHalfANewtonAndLetGo) {
   bench.path = test::Path::inside;
-  const Outcome outcome = run("doctor --json --yes --device force-dimension:");
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  Outcome outcome;
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    outcome = run("doctor --json --yes --device force-dimension:");
+    // It says where the machine stood still, and ends then.
+    if (outcome.code == 0 || (outcome.out + outcome.err).find("too busy") == std::string::npos)
+      break;
+    EXPECT_EQ(motor_force(), 0.0);
+  }
+  ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
   const nlohmann::json report = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(report["sure"], false);
   EXPECT_FALSE(report["doubts"].empty());

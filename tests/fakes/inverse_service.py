@@ -76,11 +76,15 @@ def send_message(connection, message):
 
 
 def hand(bench):
-    """[m] x right, y forward, z up: once a second down to 6 mm below z = 0."""
+    """[m] x right, y forward, z up: once a second down to 6 mm below z = 0.
+
+    It begins when the session has run for half a second's ticks: one that is inside before the
+    first frame comes touches the surface from behind.
+    """
     now = time.monotonic()
-    if bench[BEGAN] == 0.0:
+    if bench[BEGAN] == 0.0 and bench[COMMANDS] > 500:
         bench[BEGAN] = now
-    t = now - bench[BEGAN]
+    t = now - bench[BEGAN] if bench[BEGAN] > 0.0 else 0.0
     sway = 0.004 * math.sin(2.0 * t)
     return {"x": sway, "y": 0.5 * sway, "z": 0.004 + 0.01 * math.cos(2.0 * math.pi * t)}
 

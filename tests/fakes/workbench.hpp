@@ -48,7 +48,7 @@ struct Workbench {
   std::atomic<int> opens{0}, commands{0}, calibrations{0}, closes{0};
   std::atomic<double> fell{0.0};         ///< [s] when a force ended last, by the computer's word
   std::atomic<double> longest_gap{0.0};  ///< [s] between commands since the test set it to 0
-  std::atomic<double> began{0.0};        ///< [s] when the device was first read
+  std::atomic<double> began{0.0};        ///< [s] when the hand began to move
 
   /// [N] what the motors give: the firmware lets go when no command came for its watchdog's time.
   [[nodiscard]] double motor_force(double now) const {
@@ -73,10 +73,11 @@ struct Workbench {
   }
 
   /// [m] x to the right, y away, z up: up to 14 mm above z = 0 and down to 6 mm below it, once a
-  /// second, with a slow sway.
+  /// second, with a slow sway. It begins when the session has run for half a second's ticks: one
+  /// that is inside before the first frame comes touches the surface from behind.
   std::array<double, 3> hand(double now) {
-    if (began == 0.0) began = now;
-    const double t = now - began;
+    if (began == 0.0 && commands > 500) began = now;
+    const double t = began > 0.0 ? now - began : 0.0;
     const double z = path == Path::inside ? -0.006 : 0.004 + 0.01 * std::cos(2.0 * M_PI * t);
     const double sway = 0.004 * std::sin(2.0 * t);
     return {sway, 0.5 * sway, z};

@@ -44,6 +44,7 @@ class Log {
     const std::lock_guard lock(mutex_);
     return events_;
   }
+  std::atomic<double> last_gap{0.0};  // [s] from a device's last read to its last write
 
  private:
   mutable std::mutex mutex_;
@@ -142,9 +143,11 @@ class LoggingDevice final : public Device {
       : log_(std::move(log)), refuses_(refuses), info_(info) {}
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double /*t*/) noexcept override {
+    read_at_ = monotonic_now();
     return {.position = {0.0, 0.0, ++reads_ % 550 <= 50 ? wall_depth - 0.05 : wall_depth + 0.005}};
   }
   void write(const Vec3& force, double /*t*/) noexcept override {
+    log_->last_gap = monotonic_now() - read_at_;
     if (is_enabled_) log_->note(force.isZero(0.0) ? "write zero" : "write a force");
   }
   void enable() override {
@@ -162,6 +165,7 @@ class LoggingDevice final : public Device {
   std::shared_ptr<Log> log_;
   bool refuses_;
   int reads_ = 0;
+  double read_at_ = 0.0;  // [s]
   DeviceInfo info_;
 };
 
@@ -216,8 +220,9 @@ std::size_t threads_of_this_process() {
   return static_cast<std::size_t>(std::distance(begin(tasks), end(tasks)));
 }
 
-// Hazard: session-stops
-TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
+// False if its loop stood still when it was stopped, for longer than `stop` waits for it.
+bool stops_beside_a_hanging_camera() {
+  bool is_in_time = true;
   const auto log = std::make_shared<Log>();
   const auto gate = std::make_shared<Gate>();
   std::promise<void> ended;
@@ -232,25 +237,26 @@ TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
     session.start();  // harmless
     EXPECT_TRUE(session.state().running);
     const auto force_is_out = [&] { return session.statistics().force_out.load(); };
-    ASSERT_TRUE(comes_true(force_is_out)) << "no force was sent";
+    EXPECT_TRUE(comes_true(force_is_out)) << "no force was sent";
     HangingCamera::may_hang = true;
-    ASSERT_TRUE(comes_true([&] { return HangingCamera::hangs && force_is_out(); }));
+    EXPECT_TRUE(comes_true([&] { return HangingCamera::hangs && force_is_out(); }));
     session.stop();  // returns although the camera hangs
 
     const std::vector<std::string> events = log->events();
     const auto is_cancel = [](const std::string& event) { return event.starts_with("cancel"); };
     const auto is_write = [](const std::string& event) { return event.starts_with("write"); };
     const auto first_cancel = std::find_if(events.begin(), events.end(), is_cancel);
-    ASSERT_NE(first_cancel, events.end());
     EXPECT_EQ(std::count_if(events.begin(), events.end(), is_cancel), 2);
     EXPECT_EQ(std::find_if(first_cancel, events.end(), is_write), events.end())
         << "nothing is written once a camera is told to end";
     const auto last_write =
         std::find_if(std::make_reverse_iterator(first_cancel), events.rend(), is_write);
-    ASSERT_NE(last_write, events.rend());
-    EXPECT_EQ(*last_write, "write zero");
-    EXPECT_NE(std::find(last_write.base(), first_cancel, "disable"), first_cancel)
-        << "the device is disabled between the last write and the first camera's end";
+    is_in_time = log->last_gap < 0.04;  // else the device may be disabled before
+    if (is_in_time) {
+      EXPECT_TRUE(last_write != events.rend() && *last_write == "write zero");
+      EXPECT_NE(std::find(last_write.base(), first_cancel, "disable"), first_cancel)
+          << "the device is disabled between the last write and the first camera's end";
+    }
     EXPECT_GT(std::count(events.begin(), events.end(), "write a force"), 0);
 
     session.stop();  // harmless
@@ -260,6 +266,15 @@ TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
   }
   gate->open();
   camera_ended.wait();
+  return is_in_time;
+}
+
+// Hazard: session-stops
+TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    if (stops_beside_a_hanging_camera() || HasFailure()) return;
+  }
+  FAIL() << "the machine stood still in each attempt";
 }
 
 // Hazard: hang, session-stops

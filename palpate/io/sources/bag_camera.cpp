@@ -428,12 +428,8 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
         lens_at(bag_, info_topic_, info_places_[which], false, is_realsense_, is_rectified);
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
   }
-  const Intrinsics& k = rays_->intrinsics();
-  if (k.width != static_cast<int>(image.width) || k.height != static_cast<int>(image.height))
-    throw Error(name(number),
-                "is an image of " + size_text(image.width, image.height) +
-                    " pixels, but its CameraInfo has " + size_text(k.width, k.height),
-                "it may be damaged, or belong to another topic");
+  check_size(rays_->intrinsics(), image.width, image.height, name(number),
+             "it may be damaged, or belong to another topic");
   return rays_;
 }
 
@@ -504,12 +500,7 @@ std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, doub
     labels.push_back(static_cast<std::uint8_t>(pixel & 0xffU));
     if (bright) brightness.push_back(static_cast<std::uint8_t>(pixel >> 8U));
   }
-  const Intrinsics& k = rays_->intrinsics();
-  if (png.width != k.width || png.height != k.height)
-    throw Error(where,
-                "is an image of " + size_text(png.width, png.height) +
-                    " pixels, but its camera has " + size_text(k.width, k.height),
-                "it may be damaged");
+  check_size(rays_->intrinsics(), png.width, png.height, where, "it may be damaged");
   materials_ =
       std::make_shared<LabelImage>(std::move(names), std::move(labels), std::move(brightness));
   material_image_ = image;

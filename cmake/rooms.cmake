@@ -12,8 +12,10 @@ endmacro()
 
 # palpate_target_options(TARGET): warnings and sanitizers. Never leaves the build.
 function(palpate_target_options target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-                         -Wno-sign-conversion $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
+  if(PALPATE_WARNINGS)
+    target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+                           -Wno-sign-conversion $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
+  endif()
   # A product is rounded before it is added to, whatever the processor could do at once: then the
   # same session has the same forces on all of them.
   target_compile_options(${target} PRIVATE -ffp-contract=off)

@@ -38,9 +38,7 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
       setup_(setup),
       sensor_(setup.sensor, setup.camera.intrinsics),
       info_(std::move(info)),
-      rays_(std::make_shared<const ViewingRays>(setup.camera.intrinsics)),
-      directions_(setup.camera.intrinsics.width),
-      along_(setup.camera.intrinsics.width) {
+      rays_(std::make_shared<const ViewingRays>(setup.camera.intrinsics)) {
   if (!(setup.camera.frame_rate >= 0.1 && setup.camera.frame_rate <= 1000.0))
     throw Error("simulated camera: frame rate", "it is not between 0.1 and 1000 Hz",
                 "give such as 30 Hz");
@@ -105,23 +103,29 @@ std::optional<Frame> SimulatedCamera::live(double timeout) {
 Frame SimulatedCamera::capture(const BodyPoses& poses, std::uint64_t frame) {
   const std::vector<VisibleGeom>& geoms = simulation_->geoms();
   const Intrinsics& image = setup_.camera.intrinsics;
+  const auto draw = [&](const VisibleGeom& geom, const Shape& shape, std::vector<float>& depth) {
+    palpate::draw(shape,
+                  (poses.world_from_body[geom.body] * geom.body_from_shape).inverse() *
+                      setup_.camera.world_from_camera,
+                  *rays_, depth);
+  };
   if (resting_.empty()) {
     resting_.assign(static_cast<std::size_t>(image.width) * image.height, nothing);
     for (const VisibleGeom& geom : geoms) {
-      if (geom.rests && !geom.of_arm) draw(geom, geom.shape, poses, resting_);
+      if (geom.rests && !geom.of_arm) draw(geom, geom.shape, resting_);
     }
   }
   depth_ = resting_;
   for (const VisibleGeom& geom : geoms) {
     const bool drawn = geom.of_arm ? setup_.arm == ArmView::seen : !geom.rests;
-    if (drawn) draw(geom, geom.shape, poses, depth_);
+    if (drawn) draw(geom, geom.shape, depth_);
   }
   std::vector<std::uint16_t> readings = sensor_.measure(depth_, frame);
   if (setup_.arm != ArmView::seen) {
     // Starting from the scene's depth, so that what is before the arm stays.
     arm_ = depth_;
     for (std::size_t i = 0; i < geoms.size(); ++i) {
-      if (geoms[i].of_arm) draw(geoms[i], thick_[i], poses, arm_);
+      if (geoms[i].of_arm) draw(geoms[i], thick_[i], arm_);
     }
     for (std::size_t i = 0; i < readings.size(); ++i) {
       if (arm_[i] < depth_[i])
@@ -134,67 +138,6 @@ Frame SimulatedCamera::capture(const BodyPoses& poses, std::uint64_t frame) {
   return {poses.t, std::make_shared<const DepthImage>(rays_, std::move(readings),
                                                       1.0 / sensor_.model().quantisation,
                                                       setup_.camera.world_from_camera)};
-}
-
-// The pixels that can show a shape: those of balls whose convex hull holds it, which is seen within
-// the bounds of theirs. Where one of the balls is out of the image, the hull may still cross it:
-// then those of the ball around the whole shape.
-ViewingRays::Window SimulatedCamera::window(const Shape& shape,
-                                            const Eigen::Isometry3d& camera_from_shape) const {
-  const Intrinsics& image = setup_.camera.intrinsics;
-  const double bound = bounding_radius(shape);
-  if (!std::isfinite(bound)) return {0, image.width, 0, image.height};
-  const ViewingRays::Window around = rays_->window(camera_from_shape.translation(), bound);
-  ViewingRays::Window hull{image.width, 0, image.height, 0};
-  bool complete = true;
-  const auto add = [&](const Vec3& centre, double radius) {
-    const ViewingRays::Window one = rays_->window(camera_from_shape * centre, radius);
-    complete = complete && !one.empty();
-    hull = {std::min(hull.u_begin, one.u_begin), std::max(hull.u_end, one.u_end),
-            std::min(hull.v_begin, one.v_begin), std::max(hull.v_end, one.v_end)};
-  };
-  const auto add_rod = [&](const auto& rod) {
-    for (const double side : {-1.0, 1.0}) add({0.0, side * rod.half_length, 0.0}, rod.radius);
-  };
-  if (const auto* capsule = std::get_if<Capsule>(&shape)) {
-    add_rod(*capsule);
-  } else if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
-    add_rod(*cylinder);
-  } else if (const auto* prism = std::get_if<Prism>(&shape)) {
-    // Balls of some size, so that each has a pixel.
-    for (const Eigen::Vector2d& corner : prism->outline) {
-      for (const double side : {-1.0, 1.0})
-        add({corner.x(), side * prism->half_length, corner.y()}, bound / 16.0);
-    }
-  } else {
-    complete = false;
-  }
-  return complete ? hull : around;
-}
-
-// Rays are (x, y, 1) in the camera's frame, so that the length along a ray is the depth.
-void SimulatedCamera::draw(const VisibleGeom& geom, const Shape& shape, const BodyPoses& poses,
-                           std::vector<float>& depth) {
-  const Eigen::Isometry3d shape_from_camera =
-      (poses.world_from_body[geom.body] * geom.body_from_shape).inverse() *
-      setup_.camera.world_from_camera;
-  const ViewingRays::Window seen = window(shape, shape_from_camera.inverse());
-  if (seen.empty()) return;
-  const Vec3 origin = shape_from_camera.translation();
-  const Eigen::Matrix3d turn = shape_from_camera.linear();
-  const std::size_t count = seen.u_end - seen.u_begin;
-  for (int v = seen.v_begin; v < seen.v_end; ++v) {
-    float* const row = depth.data() +
-                       static_cast<std::ptrdiff_t>(v) * setup_.camera.intrinsics.width +
-                       seen.u_begin;
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector2d ray = rays_->ray(seen.u_begin + static_cast<int>(i), v);
-      directions_[i] = turn.col(0) * ray.x() + turn.col(1) * ray.y() + turn.col(2);
-      along_[i] = row[i];
-    }
-    cast(shape, origin, std::span(directions_).first(count), std::span(along_).first(count));
-    for (std::size_t i = 0; i < count; ++i) row[i] = static_cast<float>(along_[i]);
-  }
 }
 
 }  // namespace palpate::robot

@@ -54,10 +54,6 @@ class SimulatedCamera final : public Source {
 
  private:
   [[nodiscard]] std::optional<Frame> live(double timeout);
-  [[nodiscard]] ViewingRays::Window window(const Shape& shape,
-                                           const Eigen::Isometry3d& camera_from_shape) const;
-  void draw(const VisibleGeom& geom, const Shape& shape, const BodyPoses& poses,
-            std::vector<float>& depth);
 
   std::shared_ptr<Simulation> simulation_;
   SimulatedCameraSetup setup_;
@@ -68,8 +64,6 @@ class SimulatedCamera final : public Source {
   std::vector<float> resting_, depth_;  // bodies at rest, drawn once; and the newest image
   std::vector<float> arm_;              // the thickened arm
   std::optional<BehindArm> behind_arm_;
-  std::vector<Vec3> directions_;
-  std::vector<double> along_;
   std::uint64_t next_frame_ = 0;
   std::optional<double> first_;  // [s] of a live camera's frame 0
 

@@ -136,7 +136,8 @@ Verb add_eval(CLI::App& program) {
       ->delimiter(',');
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop, field, visits: number of cases of each family or class (50, 5, 4)");
+                      "pop, field, visits: number of cases of each family or class (50, 5, 4); "
+                      "real: positions to press and stroke instead");
   add_repeated(*command, "--families", options->given.families,
                "pop, field, visits, fidelity, feel: which, separated by commas")
       ->delimiter(',');

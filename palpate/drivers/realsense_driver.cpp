@@ -470,11 +470,7 @@ class Camera final : public LiveCamera {
     const Intrinsics k = intrinsics_of(lens_of(intrinsics_of_profile(profile)), info_.uri);
     const int width = api_.get_frame_width(part);
     const int height = api_.get_frame_height(part);
-    if (width != k.width || height != k.height)
-      throw Error(info_.uri,
-                  "it gives images of " + size_text(width, height) + " pixels with a lens for " +
-                      size_text(k.width, k.height),
-                  "update firmware and library");
+    check_size(k, width, height, info_.uri, "update firmware and library");
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
     const double unit = api_.get_units(part);  // [m]
     if (!(unit > 0.0))

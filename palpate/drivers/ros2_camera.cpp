@@ -366,12 +366,8 @@ class Camera final : public LiveCamera {
     info_.details = seen.details;
     if (!seen.points) {
       if (!rays_) return;  // its CameraInfo comes beside it
-      const Intrinsics& k = rays_->intrinsics();
-      if (k.width != static_cast<int>(seen.width) || k.height != static_cast<int>(seen.height))
-        throw Error(wanted_.uri,
-                    "gives images of " + size_text(seen.width, seen.height) + " pixels, but " +
-                        info_name_ + " says " + size_text(k.width, k.height),
-                    "name the CameraInfo that belongs to it with ?info=/TOPIC");
+      check_size(rays_->intrinsics(), seen.width, seen.height, wanted_.uri,
+                 "name the CameraInfo that belongs to it with ?info=/TOPIC, not " + info_name_);
     }
     arrival_ = monotonic_now();
     pending_ = std::move(seen);

@@ -166,12 +166,8 @@ class Camera final : public LiveCamera {
       throw Error(info_.uri, "it gives '" + code + "', not depth as Z16",
                   "name another node; palpate doctor lists those of depth");
     }
-    if (wanted.width != static_cast<std::uint32_t>(k.width) ||
-        wanted.height != static_cast<std::uint32_t>(k.height))
-      throw Error(info_.uri,
-                  "it gives " + size_text(wanted.width, wanted.height) +
-                      " pixels, but its intrinsics are for " + size_text(k.width, k.height),
-                  "give the intrinsics of a size that it has; v4l2-ctl --list-formats-ext");
+    check_size(k, wanted.width, wanted.height, info_.uri,
+               "give the intrinsics of a size that it has; v4l2-ctl --list-formats-ext");
     stride_ = std::max<std::size_t>(wanted.bytesperline, 2 * std::size_t{wanted.width});
     needed_ = stride_ * (wanted.height - 1) + 2 * std::size_t{wanted.width};
   }

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Touching what was recorded: the ruler on moved patches, and methods on a real camera's frames.
+#include <memory>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "lab/experiment.hpp"
+#include "lab/method.hpp"
 #include "lab/runner.hpp"
 #include "palpate/kernel/core/error.hpp"
 
@@ -14,11 +17,22 @@
 namespace palpate::lab {
 namespace test_real {
 
-Table touch(const std::string& method, const std::string& recording) {
+// Never has a force.
+class Numb final : public LabMethod {
+ public:
+  explicit Numb(const Parameters& parameters) : LabMethod(parameters) {}
+  Tick tick(const Vec3& hip, double t) noexcept override { return free(hip, t); }
+};
+
+Table touch(const std::string& method, const std::string& recording,
+            std::optional<int> cases = std::nullopt) {
   const test::TemporaryFolder folder;
   ExperimentOptions options;
   options.methods = {method};
   options.recording = recording;
+  options.cases = cases;
+  options.own_methods = {
+      {"numb", [](const MethodSetup& setup) { return std::make_unique<Numb>(setup.parameters); }}};
   const std::string csv =
       run_experiment(find_experiment("real"), options, {}, folder.path() / "real.csv");
   return {"real", csv};
@@ -58,7 +72,23 @@ TEST(Real, MovesNothingWhereTheCameraMoves) {
   }
 }
 
+TEST(Real, PressesAndStrokesWhereTheNewestFrameShowsTheSurface) {
+  const std::string recording = "synthetic:plane?speed=0.3&frames=8";  // as from a moving camera
+  const Table ideal = touch("ideal", recording, 3);
+  ASSERT_EQ(ideal.rows(), 6U) << "two actions at three positions";
+  for (std::size_t row = 0; row < ideal.rows(); ++row) {
+    EXPECT_EQ(ideal.text(row, "action"), row < 3 ? "press" : "stroke");
+    EXPECT_EQ(ideal.number(row, "lost"), 0.0) << row;
+    EXPECT_LT(ideal.number(row, "error_mm"), 0.01) << row;
+    EXPECT_GT(ideal.number(row, "step_n"), 0.0) << row;
+  }
+  const Table numb = touch("numb", recording, 3);
+  for (const char* action : {"press", "stroke"}) EXPECT_EQ(sum(numb, "lost", action), 3.0);
+}
+
 TEST(Real, SaysWhatIsMissing) {
+  EXPECT_THROW(touch("paper", "synthetic:plane?distance=3&frames=2", 1), Error) << "all too far";
+
   EXPECT_THROW(touch("paper", "synthetic:plane?distance=3&frames=2"), Error) << "all too far";
   EXPECT_THROW(touch("paper", "depth:/nowhere"), Error);
 }

@@ -143,18 +143,20 @@ TEST(Shapes, AreNowhereNearerThanTheirNearestPoint) {
   }
 }
 
-TEST(Shapes, FitInTheirBoundingBall) {
+TEST(Shapes, FitInTheirBoundingBlock) {
   for (const Case& body : cases()) {
-    const double radius = bounding_radius(body.shape);
-    if (!std::isfinite(radius)) continue;
+    const Vec3 half = bounding_half(body.shape);
+    if (!half.allFinite()) continue;
     Uniform uniform;
-    double farthest = 0.0;
+    Vec3 farthest = Vec3::Zero();
     for (int i = 0; i < 20000; ++i) {
       const Vec3 p = uniform.in_cube(0.12);
-      if (body.inside(p)) farthest = std::max(farthest, p.norm());
+      if (body.inside(p)) farthest = farthest.cwiseMax(p.cwiseAbs());
     }
-    EXPECT_LE(farthest, radius) << body.name;
-    EXPECT_GT(farthest, 0.8 * radius) << body.name;
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_LE(farthest[axis], half[axis]) << body.name;
+      EXPECT_GT(farthest[axis], 0.8 * half[axis]) << body.name;
+    }
   }
 }
 

@@ -31,21 +31,26 @@ std::ptrdiff_t alike(const std::string& a, const std::string& b) {
   return std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first - a.begin();
 }
 
-// The lens without its distortion, on one of the two topics that bags have it on.
-std::optional<Intrinsics> lens_of(BagReader& bag, const std::string& camera) {
-  for (const char* last : {"/info/camera_info", "/camera_info"}) {
-    const std::vector<BagReader::Place> places = bag.places(camera + last);
-    if (places.empty()) continue;
-    const std::string name = bag.name(camera + last, places.front());
-    const std::vector<std::byte> bytes = bag.read(places.front());
-    if (bag.find(camera + last)->type == ros::String::type) {
-      return parse_realsense_lens(ros::decode<ros::String>(bytes, name).data, name).pinhole;
-    }
+// The lens that a message tells: a CameraInfo, or a text of librealsense's, whose distortions have
+// names of their own.
+// @param is_plain      the distortion is left out
+// @param is_rectified  as intrinsics_of has it
+Intrinsics lens_at(BagReader& bag, const std::string& topic, const BagReader::Place& place,
+                   bool is_plain, bool is_realsense, bool is_rectified) {
+  const std::string name = bag.name(topic, place);
+  const std::vector<std::byte> bytes = bag.read(place);
+  RealSenseLens lens;
+  if (bag.find(topic)->type == ros::String::type) {
+    lens = parse_realsense_lens(ros::decode<ros::String>(bytes, name).data, name);
+  } else {
     auto info = ros::decode<ros::CameraInfo>(bytes, name);
+    if (!is_plain && !is_realsense) return intrinsics_of(info, is_rectified, name);
+    lens.model = info.distortion_model;
+    std::copy_n(info.d.begin(), std::min(info.d.size(), lens.coeffs.size()), lens.coeffs.begin());
     info.d.clear();
-    return intrinsics_of(info, false, name);
+    lens.pinhole = intrinsics_of(info, false, name);
   }
-  return std::nullopt;
+  return is_plain ? lens.pinhole : intrinsics_of(lens, name);
 }
 
 }  // namespace
@@ -72,9 +77,11 @@ class BagColour {
             const std::string& frame, const BagTransforms* pose)
       : bag_(bag), topic_(topic), places_(bag.places(topic)) {
     const std::string camera = camera_of_topic(topic, std::string(ros::Image::type));
-    const std::optional<Intrinsics> lens = lens_of(bag, camera);
-    if (!lens) throw Error("topic " + topic, "has no CameraInfo", "record that topic too");
-    intrinsics_ = *lens;
+    std::string info = camera + "/info/camera_info";
+    if (bag.places(info).empty()) info = camera + "/camera_info";
+    if (bag.places(info).empty())
+      throw Error("topic " + topic, "has no CameraInfo", "record that topic too");
+    intrinsics_ = lens_at(bag, info, bag.places(info).front(), true, false, false);
     const std::string name = bag_.name(topic_, places_.front());
     const auto first = ros::decode<ros::Image>(bag_.read(places_.front()), name);
     static_cast<void>(rgb_of(first, name));
@@ -155,16 +162,6 @@ namespace {
 constexpr double least_unit = 1e-6, largest_unit = 0.1;  // [m] of a RealSense's depth
 
 std::string parent(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
-
-// Of librealsense, whose models have names of their own.
-Intrinsics realsense_intrinsics(ros::CameraInfo info, const std::string& name) {
-  RealSenseLens lens;
-  lens.model = info.distortion_model;
-  std::copy_n(info.d.begin(), std::min(info.d.size(), lens.coeffs.size()), lens.coeffs.begin());
-  info.d.clear();
-  lens.pinhole = intrinsics_of(info, false, name);
-  return intrinsics_of(lens, name);
-}
 
 class Recording final : public NumberedSource {
  public:
@@ -426,25 +423,13 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
   if (which >= info_places_.size())
     throw Error(name(number), "has no message on " + info_topic_, "the bag may be damaged");
   if (!rays_ || is_ours()) {
-    const std::string info_name = bag_.name(info_topic_, info_places_[which]);
     const bool is_rectified = !is_ours() && topic_.find("rect") != std::string::npos;
-    Intrinsics k;
-    if (bag_.find(info_topic_)->type == ros::String::type) {
-      const std::string described = text(info_places_[which], info_topic_);
-      k = intrinsics_of(parse_realsense_lens(described, info_name), info_name);
-    } else {
-      const auto info = ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name);
-      k = is_realsense_ ? realsense_intrinsics(info, info_name)
-                        : intrinsics_of(info, is_rectified, info_name);
-    }
+    const Intrinsics k =
+        lens_at(bag_, info_topic_, info_places_[which], false, is_realsense_, is_rectified);
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
   }
-  const Intrinsics& k = rays_->intrinsics();
-  if (k.width != static_cast<int>(image.width) || k.height != static_cast<int>(image.height))
-    throw Error(name(number),
-                "is an image of " + size_text(image.width, image.height) +
-                    " pixels, but its CameraInfo has " + size_text(k.width, k.height),
-                "it may be damaged, or belong to another topic");
+  check_size(rays_->intrinsics(), image.width, image.height, name(number),
+             "it may be damaged, or belong to another topic");
   return rays_;
 }
 
@@ -515,12 +500,7 @@ std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, doub
     labels.push_back(static_cast<std::uint8_t>(pixel & 0xffU));
     if (bright) brightness.push_back(static_cast<std::uint8_t>(pixel >> 8U));
   }
-  const Intrinsics& k = rays_->intrinsics();
-  if (png.width != k.width || png.height != k.height)
-    throw Error(where,
-                "is an image of " + size_text(png.width, png.height) +
-                    " pixels, but its camera has " + size_text(k.width, k.height),
-                "it may be damaged");
+  check_size(rays_->intrinsics(), png.width, png.height, where, "it may be damaged");
   materials_ =
       std::make_shared<LabelImage>(std::move(names), std::move(labels), std::move(brightness));
   material_image_ = image;

@@ -185,6 +185,15 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
 
 }  // namespace
 
+void check_size(const Intrinsics& camera, std::int64_t width, std::int64_t height,
+                const std::string& subject, const std::string& remedy) {
+  if (width == camera.width && height == camera.height) return;
+  throw Error(subject,
+              "has an image of " + size_text(width, height) + " pixels, but the camera has " +
+                  size_text(camera.width, camera.height),
+              remedy);
+}
+
 DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name) {
   const char* const needed = "a 16-bit grey PNG is needed";
   const auto check = [&](PngReader& /*reader*/, const PngReader::Header& header) {

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "palpate/kernel/cloud/depth_image.hpp"
+
 namespace palpate {
 
 /// The size of an image for messages: "640x480".
@@ -15,6 +17,10 @@ template <class Number>
 std::string size_text(Number width, Number height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
+
+/// @throws Error if an image of that size is not of this camera. @param subject  whose image it is
+void check_size(const Intrinsics& camera, std::int64_t width, std::int64_t height,
+                const std::string& subject, const std::string& remedy);
 
 /// A depth image as it is stored in a file.
 struct DepthPng {

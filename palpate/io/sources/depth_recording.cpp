@@ -54,7 +54,7 @@ class DepthRecording final : public NumberedSource {
     if (next_ == images_.size()) return std::nullopt;
     const RecordedImage& image = images_[next_++];  // before anything can throw
     DepthPng png = read_depth_png(image.file);
-    check_size(image.file, png.width, png.height);
+    check(image.file, png);
     std::vector<std::uint8_t> grey;
     if (!image.brightness.empty()) grey = light(image.brightness, false);
     for (const std::uint16_t no_value : {camera_.invalid_value, camera_.saturated_value}) {
@@ -82,17 +82,14 @@ class DepthRecording final : public NumberedSource {
  private:
   [[nodiscard]] std::vector<std::uint8_t> light(const fs::path& file, bool in_colour) const {
     LightPng png = read_light_png(file, in_colour);
-    check_size(file, png.width, png.height);
+    check(file, png);
     return std::move(png.values);
   }
 
-  void check_size(const fs::path& file, int width, int height) const {
-    const Intrinsics& k = camera_.intrinsics;
-    if (width == k.width && height == k.height) return;
-    throw Error(file.string(),
-                "is an image of " + size_text(width, height) + " pixels, but the camera has " +
-                    size_text(k.width, k.height),
-                "write an intrinsics.json for this camera");
+  template <class Png>
+  void check(const fs::path& file, const Png& png) const {
+    check_size(camera_.intrinsics, png.width, png.height, file.string(),
+               "write an intrinsics.json for this camera");
   }
 
   RecordedCamera camera_;

@@ -123,7 +123,7 @@ std::unique_ptr<Source> open_map(const Uri& uri) {
                    : as_volume ? read_nrrd(path, uri.number_option("level", 0.0, -1e9, 1e9, "px"))
                    : ending == ".ply" ? read_ply(path)
                    : ending == ".stl" ? read_stl(path)
-                                      : read_obj(path);
+                                      : read_by(parse_obj, path);
   for (Vec3& point : file.points) point = options.scale * (options.turn * point);
   auto body = std::make_shared<const MeshBody>(file.points, file.triangles, path.string());
   return open_body(uri, options, std::move(body),

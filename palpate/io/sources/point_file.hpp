@@ -82,11 +82,8 @@ inline PointFile read_ply(const std::filesystem::path& path) { return read_by(pa
 
 /// Reads a PLY whose points are Gaussians as 3D Gaussian splatting writes them: `opacity`,
 /// `scale_0` to `scale_2`, `rot_0` to `rot_3`, w first, and perhaps `f_dc_0` to `f_dc_2`. Otherwise
-/// as read_ply.
+/// as parse_ply.
 PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name);
-inline PointFile read_splat(const std::filesystem::path& path) {
-  return read_by(parse_splat, path);
-}
 /// Does a PLY or glTF file declare Gaussians in its first 64 kB? False too of what cannot be read.
 bool holds_splat(const std::filesystem::path& path);
 
@@ -100,13 +97,9 @@ inline PointFile read_stl(const std::filesystem::path& path) {
 /// Reads a Wavefront OBJ's `v` and `f` into `points` and `triangles`; polygons are fanned. All else
 /// is passed over.
 PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name);
-inline PointFile read_obj(const std::filesystem::path& path) { return read_by(parse_obj, path); }
 
-/// Reads an SPZ of versions 1 to 4 as read_splat does a PLY.
+/// Reads an SPZ of versions 1 to 4 as parse_splat does a PLY.
 PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name);
-inline PointFile read_spz(const std::filesystem::path& path) {
-  return read_by(parse_spz, path, std::uintmax_t{1} << 31U);
-}
 
 /// Is a file, by its name, a glTF or GLB?
 bool is_gltf(const std::filesystem::path& path);

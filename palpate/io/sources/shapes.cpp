@@ -260,16 +260,18 @@ double cast_on(const Wave& shape, const Vec3& origin, const Vec3& direction) {
   return infinity;
 }
 
-double bound(const HalfSpace& /*shape*/) { return infinity; }
-double bound(const Sphere& shape) { return shape.radius; }
-double bound(const Capsule& shape) { return shape.radius + shape.half_length; }
-double bound(const Cylinder& shape) { return std::hypot(shape.radius, shape.half_length); }
-double bound(const Prism& shape) {
-  double squared = 0.0;
-  for (const Vec2& p : shape.outline) squared = std::max(squared, p.squaredNorm());
-  return std::hypot(std::sqrt(squared), shape.half_length);
+Vec3 half_of(const HalfSpace& /*shape*/) { return Vec3::Constant(infinity); }
+Vec3 half_of(const Sphere& shape) { return Vec3::Constant(shape.radius); }
+Vec3 half_of(const Capsule& shape) {
+  return {shape.radius, shape.radius + shape.half_length, shape.radius};
 }
-double bound(const Wave& /*shape*/) { return infinity; }
+Vec3 half_of(const Cylinder& shape) { return {shape.radius, shape.half_length, shape.radius}; }
+Vec3 half_of(const Prism& shape) {
+  Vec2 half = Vec2::Zero();
+  for (const Vec2& p : shape.outline) half = half.cwiseMax(p.cwiseAbs());
+  return {half.x(), shape.half_length, half.y()};
+}
+Vec3 half_of(const Wave& /*shape*/) { return Vec3::Constant(infinity); }
 
 }  // namespace
 
@@ -293,8 +295,8 @@ void cast(const Shape& shape, const Vec3& origin, std::span<const Vec3> directio
       shape);
 }
 
-double bounding_radius(const Shape& shape) {
-  return std::visit([](const auto& body) { return bound(body); }, shape);
+Vec3 bounding_half(const Shape& shape) {
+  return std::visit([](const auto& body) { return half_of(body); }, shape);
 }
 
 }  // namespace palpate

@@ -60,7 +60,7 @@ Nearest nearest(const Shape& shape, const Vec3& point);
 void cast(const Shape& shape, const Vec3& origin, std::span<const Vec3> directions,
           std::span<double> along);
 
-/// Radius of a ball about the origin that holds the shape; infinite where there is none.
-double bounding_radius(const Shape& shape);
+/// The edges' halves of a block about the origin that holds the shape; infinite where none does.
+Vec3 bounding_half(const Shape& shape);
 
 }  // namespace palpate

@@ -29,10 +29,6 @@ constexpr float least_share = 0.02F;      // [-] of light that a Gaussian takes,
 constexpr int lanes = 8;                  // pixels that are drawn at once
 constexpr std::size_t often = 256;        // Gaussians, after which rays may all be closed
 
-bool is_spz(const std::filesystem::path& path) {
-  return lower_case(path.extension().string()) == ".spz";
-}
-
 Eigen::Matrix3d axes_of(const Gaussian& g) { return g.turn.cast<double>().toRotationMatrix(); }
 
 // Half the sides of the box about an ellipsoid of reach_of_sigma.
@@ -308,9 +304,10 @@ std::vector<Body::DrawnGaussian> SplatBody::gaussians(
 std::unique_ptr<Source> open_splat(const Uri& uri) {
   const std::filesystem::path path = uri.path();
   const bool as_gltf = is_gltf(path);
-  const bool as_spz = is_spz(path);
+  const bool as_spz = lower_case(path.extension().string()) == ".spz";
   const BodyOptions options = body_options(uri, as_spz || as_gltf, as_gltf);
-  PointFile file = as_spz ? read_spz(path) : as_gltf ? read_gltf(path, true) : read_splat(path);
+  PointFile file =
+      as_gltf ? read_gltf(path, true) : read_by(as_spz ? parse_spz : parse_splat, path);
   const Eigen::Quaternionf turn(Eigen::Quaterniond(options.turn).cast<float>());
   std::vector<Gaussian> gaussians(file.points.size());
   for (std::size_t i = 0; i < gaussians.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "palpate/io/sources/point_file_detail.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
@@ -51,7 +52,49 @@ std::uint64_t whole_option(const Uri& uri, std::string_view key, std::uint64_t f
   return static_cast<std::uint64_t>(value);
 }
 
+// The pixels that can show a shape: where all of its block's corners are before the camera, those
+// between them, and else those of a ball about it.
+ViewingRays::Window window_of(const Shape& shape, const Eigen::Isometry3d& camera_from_shape,
+                              const ViewingRays& rays) {
+  constexpr double rounding = 1e-9;
+  const Intrinsics& image = rays.intrinsics();
+  const Vec3 half = bounding_half(shape);
+  if (!half.allFinite()) return {0, image.width, 0, image.height};
+  Eigen::Array2d low = Eigen::Array2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Array2d high = -low;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const auto side = [&](unsigned axis) { return (corner >> axis & 1U) != 0 ? 1.0 : -1.0; };
+    const Vec3 at = camera_from_shape * half.cwiseProduct(Vec3(side(0), side(1), side(2)));
+    if (!(at.z() > rounding)) return rays.window(camera_from_shape.translation(), half.norm());
+    low = low.min(at.head<2>().array() / at.z() - rounding);
+    high = high.max(at.head<2>().array() / at.z() + rounding);
+  }
+  return pixels_between(image, low, high);
+}
+
 }  // namespace
+
+// Rays are (x, y, 1) in the camera's frame, so that the length along a ray is the depth.
+void draw(const Shape& shape, const Eigen::Isometry3d& shape_from_camera, const ViewingRays& rays,
+          std::span<float> depth) {
+  const Intrinsics& image = rays.intrinsics();
+  const ViewingRays::Window window = window_of(shape, shape_from_camera.inverse(), rays);
+  if (window.empty()) return;
+  const Eigen::Matrix3d turn = shape_from_camera.linear();
+  const std::size_t count = window.u_end - window.u_begin;
+  std::vector<Vec3> directions(count);
+  std::vector<double> along(count);
+  for (int v = window.v_begin; v < window.v_end; ++v) {
+    float* row = depth.data() + static_cast<std::ptrdiff_t>(v) * image.width + window.u_begin;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector2d ray = rays.ray(window.u_begin + static_cast<int>(i), v);
+      directions[i] = turn.col(0) * ray.x() + turn.col(1) * ray.y() + turn.col(2);
+      along[i] = row[i];
+    }
+    cast(shape, shape_from_camera.translation(), directions, along);
+    for (std::size_t i = 0; i < count; ++i) row[i] = static_cast<float>(along[i]);
+  }
+}
 
 Intrinsics pinhole(int width, int height, double field_of_view) {
   Intrinsics intrinsics;
@@ -77,9 +120,7 @@ SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const Se
       scene_(std::move(scene)),
       setup_(setup),
       sensor_(sensor, setup.intrinsics),
-      rays_(std::make_shared<const ViewingRays>(setup.intrinsics)),
-      directions_(setup.intrinsics.width),
-      along_(setup.intrinsics.width) {
+      rays_(std::make_shared<const ViewingRays>(setup.intrinsics)) {
   if (!(setup.frame_rate > 0.0 && std::isfinite(setup.frame_rate)))
     throw Error("synthetic camera: frame_rate", "it is not positive", "give a rate in Hz");
   info_.frames = setup.frames;
@@ -138,42 +179,21 @@ std::shared_ptr<const ColourImage> SyntheticCamera::colour(std::span<const float
 }
 
 std::span<const float> SyntheticCamera::true_depth(double t) {
+  const auto draw = [&](const Part& part, std::vector<float>& depth) {
+    palpate::draw(part.shape, part.pose(t).inverse() * setup_.world_from_camera, *rays_, depth);
+  };
   if (resting_.empty()) {
     resting_.assign(static_cast<std::size_t>(setup_.intrinsics.width) * setup_.intrinsics.height,
                     no_surface);
     for (const Part& part : scene_.parts()) {
-      if (part.motion.rests()) draw(part, t, resting_);
+      if (part.motion.rests()) draw(part, resting_);
     }
   }
   depth_ = resting_;
   for (const Part& part : scene_.parts()) {
-    if (!part.motion.rests()) draw(part, t, depth_);
+    if (!part.motion.rests()) draw(part, depth_);
   }
   return depth_;
-}
-
-// Rays are (x, y, 1) in the camera's frame, so that the length along a ray is the depth.
-void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth) {
-  const Intrinsics& image = setup_.intrinsics;
-  const Eigen::Isometry3d part_from_camera = part.pose(t).inverse() * setup_.world_from_camera;
-  const Vec3 origin = part_from_camera.translation();
-  const Eigen::Matrix3d turn = part_from_camera.linear();
-  const double radius = bounding_radius(part.shape);
-  ViewingRays::Window window{0, image.width, 0, image.height};
-  if (std::isfinite(radius))
-    window = rays_->window(part_from_camera.inverse().translation(), radius);
-  if (window.empty()) return;
-  const std::size_t count = window.u_end - window.u_begin;
-  for (int v = window.v_begin; v < window.v_end; ++v) {
-    float* row = depth.data() + static_cast<std::ptrdiff_t>(v) * image.width + window.u_begin;
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector2d ray = rays_->ray(window.u_begin + static_cast<int>(i), v);
-      directions_[i] = turn.col(0) * ray.x() + turn.col(1) * ray.y() + turn.col(2);
-      along_[i] = row[i];
-    }
-    cast(part.shape, origin, std::span(directions_).first(count), std::span(along_).first(count));
-    for (std::size_t i = 0; i < count; ++i) row[i] = static_cast<float>(along_[i]);
-  }
 }
 
 CameraSetup camera_setup(const Uri& uri) {

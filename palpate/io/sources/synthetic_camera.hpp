@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "palpate/io/sources/scene.hpp"
@@ -23,6 +24,10 @@ Intrinsics pinhole(int width, int height, double field_of_view);
 /// @param tilt      [rad] between the sightline and straight down; the camera stands towards -y
 /// @param azimuth   [rad] by which it then walks around the z axis, to its right
 Eigen::Isometry3d looking_at_origin(double distance, double tilt, double azimuth);
+
+/// Draws the depth [m] of a shape where it is nearer than what an image has, row by row.
+void draw(const Shape& shape, const Eigen::Isometry3d& shape_from_camera, const ViewingRays& rays,
+          std::span<float> depth);
 
 /// Pose, rate and images of a synthetic camera.
 struct CameraSetup {
@@ -54,7 +59,6 @@ class SyntheticCamera final : public NumberedSource {
   [[nodiscard]] const Sensor& sensor() const { return sensor_; }
 
  private:
-  void draw(const Part& part, double t, std::vector<float>& depth);
   [[nodiscard]] std::vector<std::uint8_t> brightness(std::span<const float> depth) const;
   [[nodiscard]] std::shared_ptr<const ColourImage> colour(std::span<const float> depth) const;
   /// A wave of light at a place along an axis [m]: 0 to 255.
@@ -67,8 +71,6 @@ class SyntheticCamera final : public NumberedSource {
   Sensor sensor_;
   std::shared_ptr<const ViewingRays> rays_;
   std::vector<float> resting_, depth_;  // the parts at rest, drawn once; and the newest image
-  std::vector<Vec3> directions_;
-  std::vector<double> along_;
 };
 
 /// What a URI's options say of a camera as open_synthetic_camera takes them, for cameras that see

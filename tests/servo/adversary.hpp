@@ -177,7 +177,7 @@ class Adversary {
     void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
     void observe(const Observation& seen) noexcept override { method_->observe(seen); }
     void set_parameters(const Parameters& p) noexcept override { method_->set_parameters(p); }
-    Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+    Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip}, t); }
     Tick tick(const HandPose& hand, double t) noexcept override {
       Tick tick = method_->tick(hand, t);
       if (random_() % 3000 == 0) arm_ = any_arm();

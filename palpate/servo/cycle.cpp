@@ -124,6 +124,28 @@ ServoCommands Cycle::commands() const {
   return newest_change_.commands;
 }
 
+bool is_in_trouble(const CycleStatistics& hand, double t, double silence) noexcept {
+  // A late tick of another hand ramps that hand's force; only if it stays away is it trouble.
+  constexpr std::uint32_t refusals =
+      input_refused | direction_refused | hand_too_fast | fault_latched | output_refused;
+  const DeviceFault fault = fault_of(hand.hand.load(std::memory_order_relaxed));
+  if (fault != DeviceFault::none && fault != DeviceFault::another_hand) return true;
+  if ((hand.safety.load(std::memory_order_relaxed) & refusals) != 0) return true;
+  if (!std::isfinite(silence)) return false;
+  return hand.ticks.load(std::memory_order_relaxed) == 0 ||
+         t - hand.last_t.load(std::memory_order_relaxed) > silence;
+}
+
+// Hazard: another-hand
+HandState Cycle::read_hand(double t) noexcept {
+  HandState hand = device_.read(t);
+  if (hand.fault == DeviceFault::none &&
+      std::any_of(others_.begin(), others_.end(),
+                  [&](const auto& other) { return is_in_trouble(*other, t, silence_); }))
+    hand.fault = DeviceFault::another_hand;
+  return hand;
+}
+
 // Hazard: scene-jumps, method-switched
 // The proxy is all that another method is told of the one before. True if it is another.
 bool Cycle::adopt_change(const Change& change) noexcept {
@@ -289,7 +311,7 @@ struct Cycle::Now {
 };
 
 void Cycle::run(const Wake& wake) noexcept {
-  Now now{.t = wake.t, .hand = device_.read(wake.t)};
+  Now now{.t = wake.t, .hand = read_hand(wake.t)};
   adopt(now);
   touch(now);
   protect(now);

@@ -129,6 +129,15 @@ struct CycleStatistics {
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
 };
 
+/// Is something wrong with a hand, so that the others of its session must not push either?
+///
+/// Its device reports a fault, its safety chain has latched or rejects its input, or its ticks have
+/// stopped. Not: nobody holds the device, or it is clutched; nor a late frame, which every hand of
+/// a session detects itself. [servo]
+/// @param t        [s] now
+/// @param silence  [s] without a tick, the first included; infinite where no clock drives the ticks
+bool is_in_trouble(const CycleStatistics& hand, double t, double silence) noexcept;
+
 /// A frame that a cycle has in use.
 struct FrameInUse {
   std::shared_ptr<const Cloud> cloud;
@@ -163,6 +172,16 @@ class Cycle {
   /// The same of one that has been told more: for replays.
   Cycle(std::shared_ptr<Method> method, Device& device, const ServoCommands& commands,
         std::size_t ring = 8192);
+
+  /// Couples this hand to others of its session; before the first `run`. While one of them is in
+  /// trouble, this one has the fault DeviceFault::another_hand, as if its device reported it: if
+  /// only one of two opposing forces stopped, the other would give the user a sudden push.
+  /// @param others   of their cycles
+  /// @param silence  [s] as is_in_trouble's
+  void link(std::vector<std::shared_ptr<const CycleStatistics>> others, double silence) {
+    others_ = std::move(others);
+    silence_ = silence;
+  }
 
   /// [servo] No allocation, deallocation, lock, system call or exception (as far as the device
   /// keeps its word). `wake.t` is on the clock of the frames' stamps.
@@ -237,6 +256,7 @@ class Cycle {
   };
 
   struct Now;
+  [[nodiscard]] HandState read_hand(double t) noexcept;
   void adopt(Now& now) noexcept;
   void touch(Now& now) noexcept;
   void protect(Now& now) noexcept;
@@ -255,6 +275,8 @@ class Cycle {
   Method* method_;                                    // in use: that one, or the newest of changes_
   std::shared_ptr<const FixtureSet> first_fixtures_;  // kept as that method is
   Device& device_;
+  std::vector<std::shared_ptr<const CycleStatistics>> others_;  // as `link` was told
+  double silence_ = 0.0;
   SafetyChain safety_;
   Workspace workspace_;
   WeightSupport support_;

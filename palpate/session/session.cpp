@@ -177,9 +177,7 @@ Session::Session(SessionOptions options) : options_(std::move(options)) {
     hands_[i]->begin(open_method(settings_, first), settings_of(*hands_[i], settings_),
                      is_live() ? std::optional(servo) : std::nullopt);
   }
-  if (hands_.size() > 1) {
-    for (const auto& hand : hands_) hand->link(hands_);
-  }
+  for (const auto& hand : hands_) hand->link(hands_);
   if (!options_.record.empty()) open_recorder(options_.record, false);
 }
 
@@ -458,8 +456,6 @@ void Session::open_hands(const Cloud& seen) {
                                   [](const auto& hand) { return hand->mouse() != nullptr; });
   if (mice > 1)
     throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
-  if (alone) return;
-  for (const auto& hand : hands_) hand->prepare_link();
 }
 
 std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,

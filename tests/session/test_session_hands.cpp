@@ -24,7 +24,6 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/record/session_reader.hpp"
-#include "palpate/servo/linked_device.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
@@ -296,7 +295,7 @@ TEST(SessionHands, OfAGripperPushEachOtherApart) {
 }
 
 // Hazard: another-hand
-TEST(LinkedDevice, CallsTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
+TEST(LinkedHands, CallTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
   CycleStatistics hand;
   const double never = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(is_in_trouble(hand, 5.0, never)) << "its first tick is yet to come";

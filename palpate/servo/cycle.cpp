@@ -497,17 +497,12 @@ void Cycle::keep(const Now& now, const Wake& wake) noexcept {
 }
 
 void Cycle::keep_statistics(const ServoTick& record, const Wrench& wrench) noexcept {
-  const double sent = wrench.force.norm();
   statistics_.last_t.store(record.tick.t, std::memory_order_relaxed);
   add(statistics_.ticks, 1);
-  add(statistics_.steps, static_cast<std::uint64_t>(std::max(record.tick.steps, 0)));
-  if (record.tick.state != ContactState::free_motion) add(statistics_.contact_ticks, 1);
-  if (std::isfinite(record.frame_age)) statistics_.frame_age.add(nanoseconds(record.frame_age));
   statistics_.hand.store(record.hand, std::memory_order_relaxed);
   statistics_.safety.store(record.safety, std::memory_order_relaxed);
-  statistics_.force_out.store(sent > 0.0 || !wrench.torque.isZero(0.0), std::memory_order_relaxed);
-  if (sent > statistics_.max_force.load(std::memory_order_relaxed))
-    statistics_.max_force.store(sent, std::memory_order_relaxed);
+  statistics_.force_out.store(!wrench.force.isZero(0.0) || !wrench.torque.isZero(0.0),
+                              std::memory_order_relaxed);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     statistics_.interventions[i].store(safety_.interventions()[i], std::memory_order_relaxed);
   }

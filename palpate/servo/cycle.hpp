@@ -112,15 +112,11 @@ struct ServoTick {
 /// What the cycles have done so far. The servo's thread writes, any may look.
 struct CycleStatistics {
   std::atomic<std::uint64_t> ticks{0};
-  std::atomic<std::uint64_t> steps{0};  ///< of the proxy
-  std::atomic<std::uint64_t> contact_ticks{0};
   std::atomic<std::uint64_t> frames_adopted{0};
   std::atomic<std::uint64_t> frames_dropped{0};  ///< overtaken by a newer one before any tick
-  std::atomic<double> max_force{0.0};            ///< [N] sent
   std::atomic<std::uint32_t> hand{0};            ///< HandFlag bits of the last tick
   std::atomic<std::uint32_t> safety{0};          ///< SafetyFlag bits of the last tick
   std::atomic<double> last_t{0.0};               ///< [s] of the last tick, once `ticks` are not 0
-  Histogram frame_age;                           ///< [ns] at each tick that had a frame
   Histogram hand_over;  ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
   std::atomic<bool> force_out{false};  ///< the last tick sent a force or torque other than zero

@@ -226,10 +226,10 @@ class PythonSession {
     const RecordingState& recording = now.recording;
     const Summary& summary = now.hands[0].summary;
     py::dict interventions;
-    const auto names = safety_flag_names();
-    for (std::size_t i = 0; i < names.size(); ++i) {
+    for (std::size_t i = 0; i < safety_flag_count; ++i) {
       if (now.hands[0].interventions[i] > 0)
-        interventions[py::str(std::string(names[i]))] = now.hands[0].interventions[i];
+        interventions[py::str(std::string(safety_flag_table()[i].name))] =
+            now.hands[0].interventions[i];
     }
     py::list hands;
     for (const SessionHandState& hand : std::span(now.hands).subspan(1))

@@ -10,6 +10,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -19,7 +20,6 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 #include "palpate/net/node/node_parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -114,18 +114,11 @@ std::string number(double value) {
   return text.data();
 }
 
-template <class Names>
-std::string names_of(std::uint32_t bits, const Names& names) {
+std::string names_of(std::uint32_t bits, std::span<const FlagInfo> table) {
   std::string text;
-  std::size_t i = 0;
-  for (const auto& name : names) {
-    if ((bits >> i++ & 1U) != 0) text += (text.empty() ? "" : " ") + std::string(name);
-  }
+  for (const FlagInfo& flag : flags_in(bits, table))
+    text += (text.empty() ? "" : " ") + std::string(flag.name);
   return text;
-}
-
-std::string tick_flags(std::uint32_t bits) {
-  return names_of(bits, palpate::names_of(tick_flag_table()));
 }
 
 DiagnosticStatus status(const std::string& name, std::uint8_t level, std::string message) {
@@ -182,15 +175,15 @@ DiagnosticStatus contact_status(const std::string& name, const TickReport& ticks
   if (held) made.message += "; the force is paused (~/release ends this)";
   if (hand.latched_by != 0) {
     made.level = DiagnosticStatus::error;
-    made.message = "no force: latched by " + names_of(hand.latched_by, safety_flag_names()) +
+    made.message = "no force: latched by " + names_of(hand.latched_by, safety_flag_table()) +
                    " (~/reset_faults ends that)";
   }
   made.values = {{"force asked for [N]", number(newest.tick.force.norm())},
                  {"force sent [N]", number(newest.force.norm())},
                  {"gain", number(newest.gain)},
                  {"age of the frame [s]", number(newest.frame_age)},
-                 {"flags", tick_flags(ticks.flags)},
-                 {"safety flags", names_of(ticks.safety, safety_flag_names())},
+                 {"flags", names_of(ticks.flags, tick_flag_table())},
+                 {"safety flags", names_of(ticks.safety, safety_flag_table())},
                  {"pop-throughs suspected", std::to_string(hand.summary.pop_throughs)}};
   return made;
 }

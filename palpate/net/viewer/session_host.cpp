@@ -16,6 +16,7 @@
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/servo/placement.hpp"
@@ -41,7 +42,7 @@ static void to_json(json& shown, const MethodInfo& method) {
   shown = {{"name", method.name}, {"meaning", method.summary}};
 }
 
-static void to_json(json& shown, const TickFlagInfo& flag) {
+static void to_json(json& shown, const FlagInfo& flag) {
   shown = {{"name", flag.name}, {"meaning", flag.meaning}};
 }
 
@@ -202,10 +203,6 @@ void SessionHost::show_on(ViewerServer* server) {
 json SessionHost::hello() {
   json safety = safety_parameter_table();
   for (json& row : safety) row["stricter"] = stricter_text(row["name"].get<std::string>());
-  json safety_flags = json::array();
-  for (std::size_t i = 0; i < safety_flag_count; ++i)
-    safety_flags.push_back(
-        {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
   json choices = tools;
   if (first_tool_ &&
       std::find(choices.begin(), choices.end(), first_tool_->text()) == choices.end())
@@ -222,7 +219,7 @@ json SessionHost::hello() {
           {"safety", safety},
           {"placement", placement_table()},
           {"flags", tick_flag_table()},
-          {"safety_flags", safety_flags}};
+          {"safety_flags", safety_flag_table()}};
 }
 
 void SessionHost::forbid(const Forbid& wanted) {
@@ -349,10 +346,6 @@ json SessionHost::state() {
               {"spacing", proposed_->spacing},
               {"scale", proposed_->scale},
               {"rescaled", rescaled_uri_}};
-  json latched_by = json::array();
-  for (std::size_t i = 0; i < safety_flag_count; ++i) {
-    if ((first.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
-  }
   json fixtures = json::array();
   if (state.settings.fixtures) fixtures = state.settings.fixtures->items();
   json brush;
@@ -377,7 +370,7 @@ json SessionHost::state() {
             {"warnings", warnings}}},
           {"servo", servo_json(*session_, state)},
           {"interventions", first.interventions},
-          {"latched_by", latched_by},
+          {"latched_by", names_of(flags_in(first.latched_by, safety_flag_table()))},
           {"on_hold", state.held},
           {"flag_ticks", first.summary.flag_ticks},
           {"pop_throughs", first.summary.pop_throughs},

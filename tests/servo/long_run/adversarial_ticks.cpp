@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
         static_cast<unsigned long long>(hand.tool_ticks()), hand.strongest(),
         hand.strongest_torque());
     for (std::size_t i = 0; i < palpate::safety_flag_count; ++i)
-      std::printf("%-16s %llu\n", palpate::safety_flag_names()[i].data(),
+      std::printf("%-16s %llu\n", palpate::safety_flag_table()[i].name.data(),
                   static_cast<unsigned long long>(statistics.interventions[i].load()));
   }
   return 0;

@@ -58,14 +58,6 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
   if (info_.kind.empty()) info_.kind = "simulated depth camera of a robot's cell";
 }
 
-void SimulatedCamera::cancel() noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    cancelled_ = true;
-  }
-  cancelled_changed_.notify_all();
-}
-
 std::size_t SimulatedCamera::skip(std::size_t count) {
   if (info_.live) return 0;
   next_frame_ += count;
@@ -82,7 +74,6 @@ std::optional<Frame> SimulatedCamera::next(double timeout) {
 }
 
 std::optional<Frame> SimulatedCamera::live(double timeout) {
-  using namespace std::chrono;  // steady_clock is CLOCK_MONOTONIC
   const double now = monotonic_now();
   const double period = 1.0 / setup_.camera.frame_rate;
   if (!first_) first_ = now;
@@ -91,14 +82,9 @@ std::optional<Frame> SimulatedCamera::live(double timeout) {
   if (newest > static_cast<double>(next_frame_)) next_frame_ = static_cast<std::uint64_t>(newest);
   const double captured = *first_ + static_cast<double>(next_frame_) * period;
   const double wait = captured + setup_.latency - now;
-  {
-    std::unique_lock lock(mutex_);
-    if (wait > 0.0 || cancelled_) {
-      const double longest = std::clamp(std::min(wait, timeout), 0.0, 3600.0);
-      cancelled_changed_.wait_for(lock, duration<double>(longest), [this] { return cancelled_; });
-      if (cancelled_ || wait > timeout) return std::nullopt;
-    }
-  }
+  const double longest = std::clamp(std::min(wait, timeout), 0.0, 3600.0);
+  if (cancelled_.rest(std::chrono::duration<double>(longest)) || wait > std::max(timeout, 0.0))
+    return std::nullopt;
   return capture(simulation_->poses(captured), next_frame_++);
 }
 

@@ -156,22 +156,9 @@ void ServoLoop::watch() {
   request.priority = std::min(request.priority + watch_priority, 99);
   request.pin = false;  // the servo's core may be the one that hangs
   const RealtimeThread realtime(request);
-  std::unique_lock lock(watch_mutex_);
-  while (!watch_wakes_.wait_for(lock, watch_interval, [this] { return watch_ends_; })) {
-    lock.unlock();
-    watchdog_.look(monotonic_now());
-    lock.lock();
-  }
+  while (!watch_end_.rest(watch_interval)) watchdog_.look(monotonic_now());
   device_.disable();  // this thread may have enabled it after it was to end
   watch_has_ended_.store(true, std::memory_order_release);
-}
-
-void ServoLoop::request_end_of_watch() {
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch_ends_ = true;
-  }
-  watch_wakes_.notify_all();
 }
 
 void ServoLoop::request_stop() noexcept {
@@ -193,7 +180,7 @@ bool ServoLoop::stop() {
         return zero_sent_.load(std::memory_order_acquire);
       });
   device_.disable();
-  request_end_of_watch();
+  watch_end_.give();
   const bool returns =
       wait_for(hang_time, [this] { return watch_has_ended_.load(std::memory_order_acquire); }) &&
       (sent || (thread_ ? thread_->try_stop(hang_time) : wait_for(hang_time, [this] {

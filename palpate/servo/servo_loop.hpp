@@ -2,15 +2,14 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 
 #include "palpate/servo/cycle.hpp"
+#include "palpate/servo/end_signal.hpp"
 #include "palpate/servo/force_watchdog.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 
@@ -93,7 +92,6 @@ class ServoLoop {
   void start_driven();
   void beat(double now) noexcept;
   void watch();
-  void request_end_of_watch();
   void finish();
 
   Device& device_;
@@ -119,9 +117,7 @@ class ServoLoop {
 
   ForceWatchdog watchdog_;
   std::thread watch_;
-  std::mutex watch_mutex_;  // the servo never takes it
-  std::condition_variable watch_wakes_;
-  bool watch_ends_ = false;  // guarded by watch_mutex_
+  EndSignal watch_end_;
   std::atomic<bool> watch_has_ended_{false};
 };
 

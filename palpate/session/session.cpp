@@ -198,7 +198,9 @@ void Session::start() {
   started_ = true;
   for (std::size_t i = 0; i < feeds_.size(); ++i)
     feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); }, hand_place());
-  housekeeper_ = std::thread([this] { keep_house(); });
+  housekeeper_ = std::thread([this] {
+    while (!house_end_.rest(housekeeping_interval)) drain();
+  });
 }
 
 void Session::stop() noexcept {
@@ -211,11 +213,7 @@ void Session::stop() noexcept {
   // Zero force leaves first: nothing above this line may wait for anything.
   stop_loops();
   for (const auto& feed : feeds_) feed->request_stop();
-  {
-    const std::lock_guard lock(house_mutex_);
-    house_ends_ = true;
-  }
-  house_wakes_.notify_all();
+  house_end_.give();
   if (housekeeper_.joinable()) housekeeper_.join();
   for (const auto& feed : feeds_) static_cast<void>(feed->join(camera_join_time));
   {
@@ -620,15 +618,6 @@ void Session::wait_for_recorder() {
   const std::lock_guard lock(control_);
   for (const auto& hand : hands_) {
     if (hand->recorder) hand->recorder->flush();
-  }
-}
-
-void Session::keep_house() {
-  std::unique_lock lock(house_mutex_);
-  while (!house_wakes_.wait_for(lock, housekeeping_interval, [this] { return house_ends_; })) {
-    lock.unlock();
-    drain();
-    lock.lock();
   }
 }
 

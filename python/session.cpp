@@ -236,7 +236,7 @@ class PythonSession {
       hands.append(py::dict("name"_a = hand.name, "ticks"_a = hand.summary.ticks,
                             "contact_ticks"_a = hand.summary.contact_ticks,
                             "largest_force"_a = hand.summary.largest_sent,
-                            "latched_by"_a = hand.latched_by, "trouble"_a = hand.device.text));
+                            "latched_by"_a = hand.latched_by, "trouble"_a = hand.trouble));
     return py::dict(
         "running"_a = now.running, "rate"_a = now.rate, "method"_a = now.settings.method,
         "cameras"_a = cameras,

@@ -203,28 +203,17 @@ void ServoLoop::finish() {
   ended_.store(true, std::memory_order_release);
 }
 
-DeviceStatus ServoLoop::device_status() const {
-  const std::uint32_t hand = statistics().hand.load(std::memory_order_relaxed);
+std::string ServoLoop::trouble() const {
+  if (std::string text = device_.fault_text(); !text.empty()) return text;
+  if (hangs_ && !ended_)
+    return "the method or the device's driver has not returned from its last tick: the device is "
+           "disabled, and that thread ends when it returns";
   const double silent = watchdog_.silence(monotonic_now());
-  DeviceStatus status{.ticking = started_ && !stopped_ && silent <= options_.watch_time,
-                      .present = (hand & hand_present) != 0,
-                      .fault = fault_of(hand),
-                      .text = device_.fault_text()};
-  if (!status.text.empty()) return status;
-  if (hangs_ && !ended_) {
-    status.text =
-        "the method or the device's driver has not returned from its last tick: the "
-        "device is disabled, and that thread ends when it returns";
-    return status;
-  }
-  if (started_ && !stopped_ && !status.ticking) {
-    status.text = "no tick for " + std::to_string(std::lround(1e3 * silent)) +
-                  " ms: the device is disabled until ticks resume";
-    return status;
-  }
-  status.text = watchdog_.refusal();
-  if (status.text.empty()) status.text = describe(status.fault);
-  return status;
+  if (started_ && !stopped_ && silent > options_.watch_time)
+    return "no tick for " + std::to_string(std::lround(1e3 * silent)) +
+           " ms: the device is disabled until ticks resume";
+  if (std::string text = watchdog_.refusal(); !text.empty()) return text;
+  return std::string(describe(fault_of(statistics().hand.load(std::memory_order_relaxed))));
 }
 
 }  // namespace palpate

@@ -26,14 +26,6 @@ struct ServoOptions {
   double watch_time = 0.025;
 };
 
-/// How the device does, as far as the loop knows.
-struct DeviceStatus {
-  bool ticking = false;                   ///< a tick began within the last ServoOptions::watch_time
-  bool present = false;                   ///< in the last tick
-  DeviceFault fault = DeviceFault::none;  ///< in the last tick
-  std::string text;  ///< why there is no force and what to do; empty if the device is well
-};
-
 /// The live loop: cycles on a real-time thread of their own, or on the thread of a device that
 /// drives them, from `start` to `stop`.
 ///
@@ -84,8 +76,8 @@ class ServoLoop {
   [[nodiscard]] double rate() const { return rate_; }
   /// How often the device was disabled because no tick came.
   [[nodiscard]] std::uint64_t stalls() const { return watchdog_.stalls(); }
-  /// Any thread but the servo's.
-  [[nodiscard]] DeviceStatus device_status() const;
+  /// Why the device gives no force and what to do; empty if it is well. Any thread but the servo's.
+  [[nodiscard]] std::string trouble() const;
 
  private:
   void driven_tick() noexcept;

@@ -292,7 +292,7 @@ SessionState Session::state() {
   for (const auto& hand : hands_) {
     SessionHandState& told = state.hands.emplace_back();
     told.name = hand->name();
-    if (hand->loop() != nullptr) told.device = hand->loop()->device_status();
+    if (hand->loop() != nullptr) told.trouble = hand->loop()->trouble();
     const CycleStatistics& statistics = hand->cycle().statistics();
     for (std::size_t i = 0; i < safety_flag_count; ++i)
       told.interventions[i] = statistics.interventions[i].load();

@@ -86,7 +86,7 @@ std::string size_text(double bytes);
 struct SessionHandState {
   std::string name;  ///< empty: it is the only one
   Placement placement;
-  DeviceStatus device;  ///< of a session in real time
+  std::string trouble;  ///< of a session in real time, as ServoLoop::trouble
   Summary summary;
   std::array<std::uint64_t, safety_flag_count> interventions{};
   std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`

@@ -398,9 +398,9 @@ TEST(LiveSessionHands, LetGoWhereOneOfThemHangsAndAllEndTogether) {
   };
   EXPECT_TRUE(comes_true(sees_it));
   EXPECT_TRUE(comes_true([&] { return !one->force_out && !other->force_out; }));
-  EXPECT_EQ(session.state().hands[0].device.text, describe(DeviceFault::another_hand));
+  EXPECT_EQ(session.state().hands[0].trouble, describe(DeviceFault::another_hand));
   EXPECT_TRUE(
-      comes_true([&] { return session.state().hands[1].device.text.starts_with("no tick for"); }));
+      comes_true([&] { return session.state().hands[1].trouble.starts_with("no tick for"); }));
   for (int i = 0; i < 50; ++i) {
     ASSERT_FALSE(one->force_out);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

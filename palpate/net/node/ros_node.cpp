@@ -249,7 +249,7 @@ ros::DiagnosticArray diagnostics_of(const SessionReport& report, const ros::Head
     const SessionHandState& hand = state.hands[i];
     const std::string name = i == 0 ? "" : hand.name + " ";
     array.status.push_back(contact_status(name, ticks, hand, state.held));
-    array.status.push_back(device_status(name, ticks, hand.device.text, device));
+    array.status.push_back(device_status(name, ticks, hand.trouble, device));
   }
   array.status.push_back(recording_status(state.recording));
   return array;

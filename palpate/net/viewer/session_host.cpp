@@ -366,7 +366,7 @@ json SessionHost::state() {
            {{"uri", device.uri},
             {"kind", device.kind},
             {"takes_hand", mouse_ != nullptr},
-            {"fault", first.device.text},
+            {"fault", first.trouble},
             {"warnings", warnings}}},
           {"servo", servo_json(*session_, state)},
           {"interventions", first.interventions},

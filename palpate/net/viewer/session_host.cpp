@@ -596,76 +596,11 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
   const auto camera = static_cast<std::uint8_t>(number);
   // A still image came first before there was a server: what is shown again then is new to it.
   if (server == nullptr || (!fed.is_new && numbers_[camera] > 0)) return;
-  const Frame& frame = fed.frame;
-  FrameHeader header;
-  header.camera = camera;
-  header.number = numbers_[camera]++;
-  header.stamp = frame.stamp;
-  if (const auto* image = frame.cloud->image()) {
-    const Intrinsics& k = image->intrinsics();
-    header.width = static_cast<std::uint32_t>(k.width);
-    header.height = static_cast<std::uint32_t>(k.height);
-    header.fx = k.fx;
-    header.fy = k.fy;
-    header.cx = k.cx;
-    header.cy = k.cy;
-    header.metres_per_unit = 1.0 / image->units_per_metre();
-    header.world_from_camera = image->world_from_camera();
-    header.has_rays = k.distorted();
-    if (header.has_rays && header.number == 0) show_rays(camera, image->rays());
-    header.colour = frame.colour;
-    server->show(camera, depth_message(header, image->depth(), frame.cloud));
-  } else if (const auto* points = frame.cloud->point_cloud()) {
-    std::vector<float> xyz;
-    std::vector<std::uint32_t> triangles;
-    const auto put = [&](const Vec3& point) {
-      for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(point[axis]));
-    };
-    if (const Surface* given = points->surface()) {
-      const std::vector<Vec3>& all = given->points;
-      const bool has_colour = frame.colour && frame.colour->rgb.size() == 3 * all.size();
-      auto colour = has_colour ? std::make_shared<ColourImage>() : nullptr;
-      std::vector<std::uint32_t> place(all.size(), 0);  // among those that are finite
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        place[i] = static_cast<std::uint32_t>(xyz.size() / 3);
-        if (!all[i].allFinite()) continue;
-        put(all[i]);
-        if (!colour) continue;
-        for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) colour->rgb.push_back(frame.colour->rgb[k]);
-      }
-      for (const auto& corners : given->triangles) {
-        if (!std::all_of(corners.begin(), corners.end(),
-                         [&](std::uint32_t i) { return all[i].allFinite(); }))
-          continue;
-        for (const std::uint32_t i : corners) triangles.push_back(place[i]);
-      }
-      if (colour) {
-        colour->width = static_cast<int>(xyz.size() / 3);
-        colour->height = 1;
-        header.colour = std::move(colour);
-      }
-    } else {
-      xyz.reserve(3 * points->size());
-      for (std::size_t i = 0; i < points->size(); ++i) put(points->point(i));
-    }
-    header.width = static_cast<std::uint32_t>(xyz.size() / 3);
-    server->show(camera, points_message(header, std::move(xyz), triangles));
-  }
-}
-
-void SessionHost::show_rays(std::uint8_t camera, const ViewingRays& rays) {
-  const Intrinsics& k = rays.intrinsics();
-  std::vector<float> xy;
-  xy.reserve(2 * static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
-  for (int v = 0; v < k.height; ++v) {
-    for (int u = 0; u < k.width; ++u) {
-      const Eigen::Vector2d ray = rays.ray(u, v);
-      xy.push_back(static_cast<float>(ray.x()));
-      xy.push_back(static_cast<float>(ray.y()));
-    }
-  }
-  server_.load()->show(camera, rays_message(camera, static_cast<std::uint32_t>(k.width),
-                                            static_cast<std::uint32_t>(k.height), std::move(xy)));
+  const DepthImage* image = fed.frame.cloud->image();
+  if (image == nullptr && fed.frame.cloud->point_cloud() == nullptr) return;
+  if (image != nullptr && image->intrinsics().distorted() && numbers_[camera] == 0)
+    server->show(camera, rays_message(camera, image->rays()));
+  server->show(camera, frame_message(camera, numbers_[camera]++, fed.frame));
 }
 
 DroppedFiles::~DroppedFiles() {

@@ -74,8 +74,6 @@ class ServoLoop {
   }
   /// [Hz] of the ticks: the options', or that of a device that drives them.
   [[nodiscard]] double rate() const { return rate_; }
-  /// How often the device was disabled because no tick came.
-  [[nodiscard]] std::uint64_t stalls() const { return watchdog_.stalls(); }
   /// Why the device gives no force and what to do; empty if it is well. Any thread but the servo's.
   [[nodiscard]] std::string trouble() const;
 

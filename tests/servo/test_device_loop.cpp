@@ -103,7 +103,6 @@ TEST(DrivenLoop, DisablesADeviceWhoseCallbacksStopAndEnablesItWhenTheyComeAgain)
   EXPECT_TRUE(loop.trouble().starts_with("no tick for")) << loop.trouble();
   device.silent = false;
   wait_until([&] { return device.enabled.load(); });
-  EXPECT_GE(loop.stalls(), 1U);
   device.silent = true;
   wait_until([&] { return !device.enabled; });
   device.refuses = true;

@@ -7,7 +7,7 @@
 #include <limits>
 #include <variant>
 
-#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::robot {
@@ -41,13 +41,9 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
       rays_(std::make_shared<const ViewingRays>(setup.camera.intrinsics)),
       directions_(setup.camera.intrinsics.width),
       along_(setup.camera.intrinsics.width) {
-  if (!(setup.camera.frame_rate >= 0.1 && setup.camera.frame_rate <= 1000.0))
-    throw Error("simulated camera: frame rate", "it is not between 0.1 and 1000 Hz",
-                "give such as 30 Hz");
-  if (!(setup.latency >= 0.0 && setup.latency <= 0.4))
-    throw Error("simulated camera: latency", "it is not between 0 and 0.4 s", "give such as 30 ms");
-  if (!(setup.margin >= 0.0 && setup.margin <= 0.1))
-    throw Error("simulated camera: margin", "it is not between 0 and 0.1 m", "give such as 3 mm");
+  check_range("simulated camera", "frame rate", "Hz", 0.1, 1000.0, setup.camera.frame_rate);
+  check_range("simulated camera", "latency", "s", 0.0, 0.4, setup.latency);
+  check_range("simulated camera", "margin", "m", 0.0, 0.1, setup.margin);
   for (const VisibleGeom& geom : simulation_->geoms())
     thick_.push_back(thickened(geom.shape, geom.of_arm ? setup.margin : 0.0));
   if (setup.arm == ArmView::remembered)

@@ -51,14 +51,8 @@ ServoLoop::ServoLoop(std::shared_ptr<Method> method, Device& device, const Servo
       watchdog_(device,
                 {.force_time = std::min(ForceWatchdog::Limits().force_time, options.watch_time),
                  .watch_time = options.watch_time}) {
-  if (!(options_.rate >= 500.0 && options_.rate <= 10'000.0)) {
-    throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
-                "give a rate from 500 to 10000 Hz");
-  }
-  if (!(options_.watch_time >= 0.005 && options_.watch_time <= 1.0)) {
-    throw Error("watch time", std::to_string(options_.watch_time) + " s is out of range",
-                "give 0.005 to 1 s");
-  }
+  check_range("servo rate", "", "Hz", 500.0, 10'000.0, options_.rate);
+  check_range("watch time", "", "s", 0.005, 1.0, options_.watch_time);
 }
 
 ServoLoop::~ServoLoop() {

@@ -492,9 +492,7 @@ bool CameraFeed::stop(double timeout) {
 }
 
 void CameraFeed::set_playback(const Playback& playback) {
-  if (!(playback.speed >= Playback::slowest && playback.speed <= Playback::fastest))
-    throw Error("playback", "a speed of " + number_text(playback.speed) + " is out of range",
-                "give " + number_text(Playback::slowest) + " to " + number_text(Playback::fastest));
+  check_range("playback", "speed", "-", Playback::slowest, Playback::fastest, playback.speed);
   worker_->set_playback(playback);
 }
 

@@ -139,9 +139,7 @@ Session::Session(SessionOptions options) : options_(std::move(options)) {
   if (options_.cameras.size() > Patch::max_views)
     throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
                 "give at most " + std::to_string(Patch::max_views));
-  if (!is_live() && !(options_.rate >= 1.0 && options_.rate <= 100'000.0))
-    throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
-                "give a rate from 1 to 100000 Hz");
+  if (!is_live()) check_range("servo rate", "", "Hz", 1.0, 100'000.0, options_.rate);
   settings_ = {.method = options_.method,
                .parameters = options_.parameters,
                .safety = options_.safety,

@@ -24,7 +24,7 @@ void check_range(std::string_view noun, std::string_view name, std::string_view 
       (!whole || std::floor(value) == value))
     return;
   const std::string shown = unit == "-" ? "" : " " + std::string(unit);
-  throw Error(std::string(noun) + " '" + std::string(name) + "'",
+  throw Error(std::string(noun) + (name.empty() ? "" : " '" + std::string(name) + "'"),
               number_text(value) + shown + " is out of range",
               std::string("give a ") + (whole ? "whole number" : "value") + " from " +
                   number_text(min) + " to " + number_text(max) + shown);

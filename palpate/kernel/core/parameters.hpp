@@ -52,6 +52,7 @@ constexpr auto row_of(std::string_view name, std::string_view symbol, std::strin
 std::string number_text(double value);
 
 /// @param noun   what a row is, such as "parameter"
+/// @param name   empty: the noun says it
 /// @param whole  only whole numbers are allowed
 /// @throws Error if the value is not finite or not in [min, max].
 void check_range(std::string_view noun, std::string_view name, std::string_view unit, double min,

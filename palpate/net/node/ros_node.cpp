@@ -280,9 +280,7 @@ NodeName checked_name(const std::string& text) {
 }
 
 double checked_rate(double rate) {
-  if (!(rate >= 1.0 && rate <= 1000.0))
-    throw Error("--publish-rate", number_text(rate) + " Hz is too low or too high",
-                "give 1 to 1000");
+  check_range("--publish-rate", "", "Hz", 1.0, 1000.0, rate);
   return rate;
 }
 

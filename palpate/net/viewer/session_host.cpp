@@ -542,8 +542,7 @@ void SessionHost::command(const Command& command, Role role) {
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);
   } else if (const auto* brush = std::get_if<SetBrush>(&command)) {
-    if (!(brush->radius >= Paint::smallest && brush->radius <= Paint::largest))
-      throw Error("brush", "its radius is out of range", "give 0.001 to 0.1 m");
+    check_range("brush", "radius", "m", Paint::smallest, Paint::largest, brush->radius);
     const std::vector<std::string> names = paintable();
     if (!brush->material.empty() &&
         std::find(names.begin(), names.end(), brush->material) == names.end())

@@ -109,6 +109,19 @@ struct ServoTick {
   std::uint32_t hand = 0;                 ///< HandFlag bits, and the device's fault: see fault_of()
 };
 
+/// What is said of several ticks together.
+struct TickReport {
+  ServoTick newest = {};
+  std::uint32_t flags = 0;   ///< TickFlag bits of any of them
+  std::uint32_t safety = 0;  ///< SafetyFlag bits of any of them
+
+  void add(const ServoTick& record) {
+    newest = record;
+    flags |= record.tick.flags;
+    safety |= record.safety;
+  }
+};
+
 /// What the cycles have done so far. The servo's thread writes, any may look.
 struct CycleStatistics {
   std::atomic<std::uint64_t> ticks{0};

@@ -151,7 +151,7 @@ TEST(Protocol, SendsTheSurfaceOfATool) {
 
 TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   TickBatch batch;
-  ServoTick& record = batch.tick;
+  ServoTick& record = batch.newest;
   record.tick.t = 100.0;
   record.tick.state = ContactState::contact;
   batch.flags = 5;

@@ -37,7 +37,7 @@ class FakeHost final : public ViewerHost {
     const std::lock_guard gate(gate_);
     waits_ = false;
     TickBatch batch;
-    batch.tick.tick.t = ++beats_;
+    batch.newest.tick.t = ++beats_;
     return batch;
   }
   void hand(const HandMessage& hand) override {

@@ -35,19 +35,6 @@ constexpr dds::Quality newest_alone{.reliable = true};
 constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
 constexpr dds::Quality events{.reliable = true, .depth = 1000};  // as ROS's own
 
-// What a node says of the ticks since it said something last: the newest, and the flags of all.
-struct TickReport {
-  ServoTick newest{};
-  std::uint32_t flags = 0;   // TickFlag bits
-  std::uint32_t safety = 0;  // SafetyFlag bits
-
-  void add(const ServoTick& record) {
-    newest = record;
-    flags |= record.tick.flags;
-    safety |= record.safety;
-  }
-};
-
 struct SessionReport {
   SessionState state;
   double tick_rate = 0.0;        // [Hz] measured

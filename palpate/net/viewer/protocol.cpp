@@ -215,7 +215,7 @@ ViewerMessage rays_message(std::uint8_t camera, const ViewingRays& rays) {
 
 ViewerMessage ticks_message(const TickBatch& batch) {
   const std::size_t count = std::min(batch.samples.size(), TickBatch::max_samples);
-  const ServoTick& record = batch.tick;
+  const ServoTick& record = batch.newest;
   const Tick& tick = record.tick;
   const auto contacts = std::span(tick.contacts).first(tick.contact_count);
   ViewerMessage message;
@@ -338,9 +338,7 @@ std::optional<Command> parse_command(std::string_view message) {
 
 void TickBatcher::add(const ServoTick& record, double contact_radius) {
   const Tick& tick = record.tick;
-  batch_.tick = record;
-  batch_.flags |= tick.flags;
-  batch_.safety |= record.safety;
+  batch_.add(record);
   any_ = true;
 
   // How far the HIP is below the surface, which is one contact radius below the proxy.

@@ -63,11 +63,9 @@ struct TickSample {
 };
 
 /// The newest tick, and what happened since the message before.
-struct TickBatch {
-  ServoTick tick = {};
-  std::uint32_t flags = 0;          ///< TickFlag bits of any tick
-  std::uint32_t safety = 0;         ///< SafetyFlag bits of any tick
-  std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
+struct TickBatch : TickReport {
+  std::vector<TickSample> samples =
+      {};  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };
 ViewerMessage ticks_message(const TickBatch& batch);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <future>
 #include <limits>
 #include <map>
@@ -742,18 +741,15 @@ void Session::report_closed(const std::vector<Recorder::Status>& parts) {
                          : "; " + part.folder.filename().string() + ": " +
                                std::to_string(part.ticks) + " ticks";
   }
-  std::array<char, 32> seconds{};
-  std::snprintf(seconds.data(), seconds.size(), "; %.1f s, ", recording_.seconds);
-  recording_.message = text + seconds.data() + size_text(recording_.bytes);
+  recording_.message =
+      text + "; " + fixed_text(recording_.seconds, 1) + " s, " + size_text(recording_.bytes);
 }
 
 std::string size_text(double bytes) {
   const auto [unit, name] = bytes >= 1e9   ? std::pair(1e9, "GB")
                             : bytes >= 1e6 ? std::pair(1e6, "MB")
                                            : std::pair(1e3, "kB");
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g %s", bytes / unit, name);
-  return text.data();
+  return number_text(bytes / unit, 3) + " " + name;
 }
 
 const Timing* Session::timing(std::size_t hand) const {

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <cctype>
-#include <cstdio>
 #include <exception>
 #include <functional>
 #include <mutex>
@@ -95,11 +94,7 @@ Marker arrow(const ros::Header& header, const std::string& name, const Vec3& fro
   return made;
 }
 
-std::string number(double value) {
-  std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
+std::string number(double value) { return number_text(value, 4); }
 
 std::string names_of(std::uint32_t bits, std::span<const FlagInfo> table) {
   std::string text;

@@ -40,7 +40,7 @@ nlohmann::ordered_json object_of(const PortEnergy& port, double worst) {
 nlohmann::ordered_json object_of(const Summary& summary) {
   nlohmann::ordered_json safety;
   for (std::size_t i = 0; i < safety_flag_count; ++i)
-    safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
+    safety[std::string(safety_flag_table()[i].name)] = summary.safety_ticks[i];
   const Vec3 mean =
       summary.sum_sent / static_cast<double>(std::max<std::size_t>(summary.force_ticks, 1));
   return {{"ticks", summary.ticks},

@@ -2,6 +2,7 @@
 // Numbers that can be set, what can be touched, and a method that touches it.
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -194,14 +195,11 @@ py::dict table_dict(const Table& table) {
   return all;
 }
 
-// name -> meaning of the bits that are set. @param at  name and meaning of a bit
-template <class At>
-py::dict named_bits(std::uint32_t bits, std::size_t count, const At& at) {
+// name -> meaning of the bits that are set.
+py::dict named_bits(std::uint32_t bits, std::span<const FlagInfo> table) {
   py::dict set;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto [name, meaning] = at(i);
-    if (((bits >> i) & 1U) != 0U) set[py::str(std::string(name))] = std::string(meaning);
-  }
+  for (const auto& [name, meaning] : flags_in(bits, table))
+    set[py::str(std::string(name))] = std::string(meaning);
   return set;
 }
 
@@ -227,21 +225,10 @@ void define_tables(py::module_& m) {
       "methods", [] { return summaries_of(standard_methods()); },
       "The available methods: name -> description.");
   m.def(
-      "flags",
-      [](std::uint32_t bits) {
-        const auto table = tick_flag_table();
-        return named_bits(bits, table.size(), [&](std::size_t i) {
-          return std::pair{table[i].name, table[i].meaning};
-        });
-      },
+      "flags", [](std::uint32_t bits) { return named_bits(bits, tick_flag_table()); },
       py::arg("bits"), "The conditions in a tick's `flags`: name -> what it means.");
   m.def(
-      "safety_flags",
-      [](std::uint32_t bits) {
-        return named_bits(bits, safety_flag_names().size(), [](std::size_t i) {
-          return std::pair{safety_flag_names()[i], safety_flag_meanings()[i]};
-        });
-      },
+      "safety_flags", [](std::uint32_t bits) { return named_bits(bits, safety_flag_table()); },
       py::arg("bits"), "What the safety chain did in a tick, from its `safety`.");
 }
 

@@ -226,17 +226,17 @@ class PythonSession {
     const RecordingState& recording = now.recording;
     const Summary& summary = now.hands[0].summary;
     py::dict interventions;
-    const auto names = safety_flag_names();
-    for (std::size_t i = 0; i < names.size(); ++i) {
+    for (std::size_t i = 0; i < safety_flag_count; ++i) {
       if (now.hands[0].interventions[i] > 0)
-        interventions[py::str(std::string(names[i]))] = now.hands[0].interventions[i];
+        interventions[py::str(std::string(safety_flag_table()[i].name))] =
+            now.hands[0].interventions[i];
     }
     py::list hands;
     for (const SessionHandState& hand : std::span(now.hands).subspan(1))
       hands.append(py::dict("name"_a = hand.name, "ticks"_a = hand.summary.ticks,
                             "contact_ticks"_a = hand.summary.contact_ticks,
                             "largest_force"_a = hand.summary.largest_sent,
-                            "latched_by"_a = hand.latched_by, "trouble"_a = hand.device.text));
+                            "latched_by"_a = hand.latched_by, "trouble"_a = hand.trouble));
     return py::dict(
         "running"_a = now.running, "rate"_a = now.rate, "method"_a = now.settings.method,
         "cameras"_a = cameras,

@@ -7,7 +7,7 @@
 #include <limits>
 #include <variant>
 
-#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::robot {
@@ -39,13 +39,9 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
       sensor_(setup.sensor, setup.camera.intrinsics),
       info_(std::move(info)),
       rays_(std::make_shared<const ViewingRays>(setup.camera.intrinsics)) {
-  if (!(setup.camera.frame_rate >= 0.1 && setup.camera.frame_rate <= 1000.0))
-    throw Error("simulated camera: frame rate", "it is not between 0.1 and 1000 Hz",
-                "give such as 30 Hz");
-  if (!(setup.latency >= 0.0 && setup.latency <= 0.4))
-    throw Error("simulated camera: latency", "it is not between 0 and 0.4 s", "give such as 30 ms");
-  if (!(setup.margin >= 0.0 && setup.margin <= 0.1))
-    throw Error("simulated camera: margin", "it is not between 0 and 0.1 m", "give such as 3 mm");
+  check_range("simulated camera", "frame rate", "Hz", 0.1, 1000.0, setup.camera.frame_rate);
+  check_range("simulated camera", "latency", "s", 0.0, 0.4, setup.latency);
+  check_range("simulated camera", "margin", "m", 0.0, 0.1, setup.margin);
   for (const VisibleGeom& geom : simulation_->geoms())
     thick_.push_back(thickened(geom.shape, geom.of_arm ? setup.margin : 0.0));
   if (setup.arm == ArmView::remembered)
@@ -54,14 +50,6 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
   info_.live = simulation_->runs();
   info_.clock = info_.live ? StampClock::monotonic : StampClock::recording;
   if (info_.kind.empty()) info_.kind = "simulated depth camera of a robot's cell";
-}
-
-void SimulatedCamera::cancel() noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    cancelled_ = true;
-  }
-  cancelled_changed_.notify_all();
 }
 
 std::size_t SimulatedCamera::skip(std::size_t count) {
@@ -80,7 +68,6 @@ std::optional<Frame> SimulatedCamera::next(double timeout) {
 }
 
 std::optional<Frame> SimulatedCamera::live(double timeout) {
-  using namespace std::chrono;  // steady_clock is CLOCK_MONOTONIC
   const double now = monotonic_now();
   const double period = 1.0 / setup_.camera.frame_rate;
   if (!first_) first_ = now;
@@ -89,14 +76,9 @@ std::optional<Frame> SimulatedCamera::live(double timeout) {
   if (newest > static_cast<double>(next_frame_)) next_frame_ = static_cast<std::uint64_t>(newest);
   const double captured = *first_ + static_cast<double>(next_frame_) * period;
   const double wait = captured + setup_.latency - now;
-  {
-    std::unique_lock lock(mutex_);
-    if (wait > 0.0 || cancelled_) {
-      const double longest = std::clamp(std::min(wait, timeout), 0.0, 3600.0);
-      cancelled_changed_.wait_for(lock, duration<double>(longest), [this] { return cancelled_; });
-      if (cancelled_ || wait > timeout) return std::nullopt;
-    }
-  }
+  const double longest = std::clamp(std::min(wait, timeout), 0.0, 3600.0);
+  if (cancelled_.rest(std::chrono::duration<double>(longest)) || wait > std::max(timeout, 0.0))
+    return std::nullopt;
   return capture(simulation_->poses(captured), next_frame_++);
 }
 

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "palpate/io/sources/sensor_model.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/net/teleop/behind_arm.hpp"
+#include "palpate/servo/end_signal.hpp"
 
 #include "robot/simulation.hpp"
 
@@ -45,7 +44,7 @@ class SimulatedCamera final : public Source {
 
   std::optional<Frame> next(double timeout = no_timeout) override;
   std::size_t skip(std::size_t count) override;
-  void cancel() noexcept override;
+  void cancel() noexcept override { cancelled_.give(); }
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   /// The frame of these poses; its noise depends on the seed and the number alone.
@@ -67,9 +66,7 @@ class SimulatedCamera final : public Source {
   std::uint64_t next_frame_ = 0;
   std::optional<double> first_;  // [s] of a live camera's frame 0
 
-  std::mutex mutex_;
-  std::condition_variable cancelled_changed_;
-  bool cancelled_ = false;
+  EndSignal cancelled_;
 };
 
 }  // namespace palpate::robot

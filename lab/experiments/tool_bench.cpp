@@ -86,7 +86,7 @@ class Penalty final : public LabMethod {
  public:
   Penalty(std::shared_ptr<const ToolShape> shape, bool has_voxels)
       : LabMethod(Parameters()), shape_(std::move(shape)), has_voxels_(has_voxels) {}
-  Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+  Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip}, t); }
   Tick tick(const HandPose& hand, double t) noexcept override {
     const DepthImage& image = *seen()->image();
     if (has_voxels_ && is_new_) voxels_.take(image, hand.position, shape_->reach());

@@ -124,6 +124,28 @@ ServoCommands Cycle::commands() const {
   return newest_change_.commands;
 }
 
+bool is_in_trouble(const CycleStatistics& hand, double t, double silence) noexcept {
+  // A late tick of another hand ramps that hand's force; only if it stays away is it trouble.
+  constexpr std::uint32_t refusals =
+      input_refused | direction_refused | hand_too_fast | fault_latched | output_refused;
+  const DeviceFault fault = fault_of(hand.hand.load(std::memory_order_relaxed));
+  if (fault != DeviceFault::none && fault != DeviceFault::another_hand) return true;
+  if ((hand.safety.load(std::memory_order_relaxed) & refusals) != 0) return true;
+  if (!std::isfinite(silence)) return false;
+  return hand.ticks.load(std::memory_order_relaxed) == 0 ||
+         t - hand.last_t.load(std::memory_order_relaxed) > silence;
+}
+
+// Hazard: another-hand
+HandState Cycle::read_hand(double t) noexcept {
+  HandState hand = device_.read(t);
+  if (hand.fault == DeviceFault::none &&
+      std::any_of(others_.begin(), others_.end(),
+                  [&](const auto& other) { return is_in_trouble(*other, t, silence_); }))
+    hand.fault = DeviceFault::another_hand;
+  return hand;
+}
+
 // Hazard: scene-jumps, method-switched
 // The proxy is all that another method is told of the one before. True if it is another.
 bool Cycle::adopt_change(const Change& change) noexcept {
@@ -289,7 +311,7 @@ struct Cycle::Now {
 };
 
 void Cycle::run(const Wake& wake) noexcept {
-  Now now{.t = wake.t, .hand = device_.read(wake.t)};
+  Now now{.t = wake.t, .hand = read_hand(wake.t)};
   adopt(now);
   touch(now);
   protect(now);
@@ -475,17 +497,12 @@ void Cycle::keep(const Now& now, const Wake& wake) noexcept {
 }
 
 void Cycle::keep_statistics(const ServoTick& record, const Wrench& wrench) noexcept {
-  const double sent = wrench.force.norm();
   statistics_.last_t.store(record.tick.t, std::memory_order_relaxed);
   add(statistics_.ticks, 1);
-  add(statistics_.steps, static_cast<std::uint64_t>(std::max(record.tick.steps, 0)));
-  if (record.tick.state != ContactState::free_motion) add(statistics_.contact_ticks, 1);
-  if (std::isfinite(record.frame_age)) statistics_.frame_age.add(nanoseconds(record.frame_age));
   statistics_.hand.store(record.hand, std::memory_order_relaxed);
   statistics_.safety.store(record.safety, std::memory_order_relaxed);
-  statistics_.force_out.store(sent > 0.0 || !wrench.torque.isZero(0.0), std::memory_order_relaxed);
-  if (sent > statistics_.max_force.load(std::memory_order_relaxed))
-    statistics_.max_force.store(sent, std::memory_order_relaxed);
+  statistics_.force_out.store(!wrench.force.isZero(0.0) || !wrench.torque.isZero(0.0),
+                              std::memory_order_relaxed);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     statistics_.interventions[i].store(safety_.interventions()[i], std::memory_order_relaxed);
   }

@@ -109,18 +109,27 @@ struct ServoTick {
   std::uint32_t hand = 0;                 ///< HandFlag bits, and the device's fault: see fault_of()
 };
 
+/// What is said of several ticks together.
+struct TickReport {
+  ServoTick newest = {};
+  std::uint32_t flags = 0;   ///< TickFlag bits of any of them
+  std::uint32_t safety = 0;  ///< SafetyFlag bits of any of them
+
+  void add(const ServoTick& record) {
+    newest = record;
+    flags |= record.tick.flags;
+    safety |= record.safety;
+  }
+};
+
 /// What the cycles have done so far. The servo's thread writes, any may look.
 struct CycleStatistics {
   std::atomic<std::uint64_t> ticks{0};
-  std::atomic<std::uint64_t> steps{0};  ///< of the proxy
-  std::atomic<std::uint64_t> contact_ticks{0};
   std::atomic<std::uint64_t> frames_adopted{0};
   std::atomic<std::uint64_t> frames_dropped{0};  ///< overtaken by a newer one before any tick
-  std::atomic<double> max_force{0.0};            ///< [N] sent
   std::atomic<std::uint32_t> hand{0};            ///< HandFlag bits of the last tick
   std::atomic<std::uint32_t> safety{0};          ///< SafetyFlag bits of the last tick
   std::atomic<double> last_t{0.0};               ///< [s] of the last tick, once `ticks` are not 0
-  Histogram frame_age;                           ///< [ns] at each tick that had a frame
   Histogram hand_over;  ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
   std::atomic<bool> force_out{false};  ///< the last tick sent a force or torque other than zero
@@ -128,6 +137,15 @@ struct CycleStatistics {
   std::atomic<std::uint64_t> gate_cuts{0};   ///< ticks in which the LastGate sent less than asked
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
 };
+
+/// Is something wrong with a hand, so that the others of its session must not push either?
+///
+/// Its device reports a fault, its safety chain has latched or rejects its input, or its ticks have
+/// stopped. Not: nobody holds the device, or it is clutched; nor a late frame, which every hand of
+/// a session detects itself. [servo]
+/// @param t        [s] now
+/// @param silence  [s] without a tick, the first included; infinite where no clock drives the ticks
+bool is_in_trouble(const CycleStatistics& hand, double t, double silence) noexcept;
 
 /// A frame that a cycle has in use.
 struct FrameInUse {
@@ -163,6 +181,16 @@ class Cycle {
   /// The same of one that has been told more: for replays.
   Cycle(std::shared_ptr<Method> method, Device& device, const ServoCommands& commands,
         std::size_t ring = 8192);
+
+  /// Couples this hand to others of its session; before the first `run`. While one of them is in
+  /// trouble, this one has the fault DeviceFault::another_hand, as if its device reported it: if
+  /// only one of two opposing forces stopped, the other would give the user a sudden push.
+  /// @param others   of their cycles
+  /// @param silence  [s] as is_in_trouble's
+  void link(std::vector<std::shared_ptr<const CycleStatistics>> others, double silence) {
+    others_ = std::move(others);
+    silence_ = silence;
+  }
 
   /// [servo] No allocation, deallocation, lock, system call or exception (as far as the device
   /// keeps its word). `wake.t` is on the clock of the frames' stamps.
@@ -237,6 +265,7 @@ class Cycle {
   };
 
   struct Now;
+  [[nodiscard]] HandState read_hand(double t) noexcept;
   void adopt(Now& now) noexcept;
   void touch(Now& now) noexcept;
   void protect(Now& now) noexcept;
@@ -255,6 +284,8 @@ class Cycle {
   Method* method_;                                    // in use: that one, or the newest of changes_
   std::shared_ptr<const FixtureSet> first_fixtures_;  // kept as that method is
   Device& device_;
+  std::vector<std::shared_ptr<const CycleStatistics>> others_;  // as `link` was told
+  double silence_ = 0.0;
   SafetyChain safety_;
   Workspace workspace_;
   WeightSupport support_;

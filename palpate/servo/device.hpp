@@ -65,7 +65,7 @@ enum class DeviceFault : std::uint8_t {
   busy,             ///< another program holds it
   refused_command,  ///< it did not accept a force
   other,            ///< see Device::fault_text
-  another_hand,     ///< another hand of the session is in trouble; see LinkedDevice
+  another_hand,     ///< another hand of the session is in trouble; see Cycle::link
 };
 
 /// As in the code, e.g. "not_calibrated".

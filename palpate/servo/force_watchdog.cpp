@@ -12,7 +12,6 @@ void ForceWatchdog::look(double now) {
   if (stalled && !disabled_) {
     device_.disable();
     disabled_ = true;
-    stalls_.fetch_add(1, std::memory_order_relaxed);
   } else if (!stalled && disabled_ && now >= next_attempt_) {
     std::string refusal;
     try {

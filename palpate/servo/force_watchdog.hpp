@@ -2,7 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <mutex>
 #include <string>
 
@@ -43,10 +42,6 @@ class ForceWatchdog {
   [[nodiscard]] double silence(double now) const noexcept {
     return now - last_beat_.load(std::memory_order_relaxed);
   }
-  /// How often the device was disabled. Any thread.
-  [[nodiscard]] std::uint64_t stalls() const noexcept {
-    return stalls_.load(std::memory_order_relaxed);
-  }
   /// Why the device could not be enabled again; empty if it could. Any thread but the servo's.
   [[nodiscard]] std::string refusal() const;
 
@@ -55,7 +50,6 @@ class ForceWatchdog {
   Limits limits_;
   std::atomic<double> last_beat_{0.0};  // [s]
   std::atomic<bool> force_out_{false};
-  std::atomic<std::uint64_t> stalls_{0};
   // Of the thread that looks:
   bool disabled_ = false;
   double next_attempt_ = 0.0;  // [s]

@@ -6,10 +6,9 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
-#include <string>
 #include <utility>
 
-#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 
 namespace palpate {
 namespace {
@@ -36,10 +35,7 @@ std::uint32_t clipped(std::uint64_t nanoseconds) noexcept {
 PeriodicThread::PeriodicThread(double rate, const RealtimeRequest& request,
                                std::function<void(const Wake&)> cycle, std::function<void()> last)
     : cycle_(std::move(cycle)), last_(std::move(last)), ended_(ending_.get_future()) {
-  if (!(rate >= 1.0 && rate <= 10'000.0)) {
-    throw Error("servo rate", std::to_string(rate) + " Hz is out of range",
-                "give a rate from 1 to 10000 Hz");
-  }
+  check_range("servo rate", "", "Hz", 1.0, 10'000.0, rate);
   const auto period = static_cast<std::uint64_t>(std::llround(1e9 / rate));
   std::promise<RealtimeReport> started;
   std::future<RealtimeReport> report = started.get_future();

@@ -57,7 +57,6 @@ class PeriodicThread {
   /// Asks the thread to stop and waits, at most `timeout` [s], until `last` has been called.
   /// @return false if it has not: the cycle in progress hangs
   bool try_stop(double timeout);
-  [[nodiscard]] bool stopped() const { return !thread_.joinable(); }
 
   [[nodiscard]] const RealtimeReport& realtime() const { return report_; }
   [[nodiscard]] const Timing& timing() const { return timing_; }

@@ -70,15 +70,14 @@ RealtimeThread::RealtimeThread(const RealtimeRequest& request) {
         "realtime.conf, put yourself in the group 'realtime' and log in again");
   }
 
-  if (request.lock_memory) {
-    report_.locked = may_lock_all_that_is_to_come() && mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-    touch_stack();
-    if (!report_.locked) {
-      report_.advice.emplace_back(
-          "locking memory was refused: add '@realtime - memlock unlimited' to "
-          "/etc/security/limits.d/realtime.conf, put yourself in the group 'realtime' and log in "
-          "again");
-    }
+  // No page is to be fetched from disk in a tick.
+  report_.locked = may_lock_all_that_is_to_come() && mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  touch_stack();
+  if (!report_.locked) {
+    report_.advice.emplace_back(
+        "locking memory was refused: add '@realtime - memlock unlimited' to "
+        "/etc/security/limits.d/realtime.conf, put yourself in the group 'realtime' and log in "
+        "again");
   }
 
   if (request.pin) {

@@ -9,11 +9,10 @@ namespace palpate {
 
 /// What a real-time thread asks the operating system for.
 struct RealtimeRequest {
-  bool enabled = true;      ///< false asks for nothing: for tests and for free-running work
-  int priority = 80;        ///< SCHED_FIFO, 1 to 99; above the kernel's interrupt threads' 50
-  bool pin = true;          ///< pin the thread to one core of the process's affinity mask
-  unsigned core = 0;        ///< index of that core counted from the last (0), modulo their number
-  bool lock_memory = true;  ///< mlockall: no page is fetched from disk in a tick
+  bool enabled = true;  ///< false asks for nothing: for tests and for free-running work
+  int priority = 80;    ///< SCHED_FIFO, 1 to 99; above the kernel's interrupt threads' 50
+  bool pin = true;      ///< pin the thread to one core of the process's affinity mask
+  unsigned core = 0;    ///< index of that core counted from the last (0), modulo their number
 };
 
 /// What was granted, and what to do about the rest.

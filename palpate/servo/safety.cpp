@@ -40,32 +40,32 @@ constexpr double unsure_force = 0.5;
 // [s] in which the limit comes down to it: as long as a force fades with the age of frames.
 constexpr double unsure_time = 0.4;
 
-constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused",   "pull_removed",   "force_cut",   "continuous_cut",    "slew_cut",
-    "oscillation_cut", "disengaged",     "ramping",     "frame_late",        "frame_fading",
-    "frame_lost",      "hand_too_fast",  "stalled",     "direction_refused", "fault_latched",
-    "energy_cut",      "output_refused", "scale_unsure"};
-
-constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
-    "no force: the device or the method gave a number that is not finite, or time ran backwards",
-    "the part of the force that pulled into the surface was removed",
-    "the force is at its limit: the method requested more than the user or the device allows",
-    "the force is limited because the motors are warm",
-    "the force changes more slowly than the method requested",
-    "the surface is softened because the force swung fast, again and again",
-    "no force: the device is not engaged; move away from the surface: it engages when the "
-    "requested force is nearly zero",
-    "the force is ramping up after engaging or after an interruption",
-    "the force may only fall: a camera's next frame is overdue",
-    "the force fades: a camera's newest frame is old",
-    "no force: a camera has sent no frame that can be used for too long",
-    "no force: the hand was faster than max_speed",
-    "the force restarts from zero: the loop missed its deadlines",
-    "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
-    "no force: repeated faults; an operator has to reset the safety chain",
-    "the surface is softened because it kept up an oscillation",
-    "no force: the result of the safety chain violated its limits; please report it",
-    "the force is limited because the scale of a camera's depths is in doubt"};
+constexpr std::array<FlagInfo, safety_flag_count> flag_table{{
+    {"input_refused",
+     "no force: the device or the method gave a number that is not finite, or time ran backwards"},
+    {"pull_removed", "the part of the force that pulled into the surface was removed"},
+    {"force_cut",
+     "the force is at its limit: the method requested more than the user or the device allows"},
+    {"continuous_cut", "the force is limited because the motors are warm"},
+    {"slew_cut", "the force changes more slowly than the method requested"},
+    {"oscillation_cut", "the surface is softened because the force swung fast, again and again"},
+    {"disengaged",
+     "no force: the device is not engaged; move away from the surface: it engages when the "
+     "requested force is nearly zero"},
+    {"ramping", "the force is ramping up after engaging or after an interruption"},
+    {"frame_late", "the force may only fall: a camera's next frame is overdue"},
+    {"frame_fading", "the force fades: a camera's newest frame is old"},
+    {"frame_lost", "no force: a camera has sent no frame that can be used for too long"},
+    {"hand_too_fast", "no force: the hand was faster than max_speed"},
+    {"stalled", "the force restarts from zero: the loop missed its deadlines"},
+    {"direction_refused",
+     "no force: the method's surface normal contradicts the direction from the HIP to the proxy"},
+    {"fault_latched", "no force: repeated faults; an operator has to reset the safety chain"},
+    {"energy_cut", "the surface is softened because it kept up an oscillation"},
+    {"output_refused",
+     "no force: the result of the safety chain violated its limits; please report it"},
+    {"scale_unsure", "the force is limited because the scale of a camera's depths is in doubt"},
+}};
 
 using P = SafetyParameters;
 template <double P::*member>
@@ -175,9 +175,7 @@ bool add_within(double limit, const Vec3& more, Vec3& force) {
 
 }  // namespace
 
-std::span<const std::string_view> safety_flag_names() { return flag_names; }
-
-std::span<const std::string_view> safety_flag_meanings() { return flag_meanings; }
+std::span<const FlagInfo> safety_flag_table() { return flag_table; }
 
 std::span<const SafetyParameterInfo> safety_parameter_table() { return table; }
 

@@ -9,6 +9,7 @@
 
 #include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/core/tick.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/energy_monitor.hpp"
 #include "palpate/servo/transient_budget.hpp"
@@ -64,10 +65,8 @@ enum SafetyFlag : std::uint32_t {
   scale_unsure = 1u << 17,
 };
 constexpr std::size_t safety_flag_count = 18;
-/// A short name for each bit, in their order, e.g. "force_cut".
-std::span<const std::string_view> safety_flag_names();
-/// For each bit, in their order, a sentence for people: why the force is what it is.
-std::span<const std::string_view> safety_flag_meanings();
+/// One row for each bit, in their order: why the force is what it is.
+std::span<const FlagInfo> safety_flag_table();
 
 /// What the chain allows. Defaults are safe for a Touch-class device; docs/safety.md gives the
 /// reason for each number.

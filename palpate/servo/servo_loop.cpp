@@ -51,14 +51,8 @@ ServoLoop::ServoLoop(std::shared_ptr<Method> method, Device& device, const Servo
       watchdog_(device,
                 {.force_time = std::min(ForceWatchdog::Limits().force_time, options.watch_time),
                  .watch_time = options.watch_time}) {
-  if (!(options_.rate >= 500.0 && options_.rate <= 10'000.0)) {
-    throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
-                "give a rate from 500 to 10000 Hz");
-  }
-  if (!(options_.watch_time >= 0.005 && options_.watch_time <= 1.0)) {
-    throw Error("watch time", std::to_string(options_.watch_time) + " s is out of range",
-                "give 0.005 to 1 s");
-  }
+  check_range("servo rate", "", "Hz", 500.0, 10'000.0, options_.rate);
+  check_range("watch time", "", "s", 0.005, 1.0, options_.watch_time);
 }
 
 ServoLoop::~ServoLoop() {
@@ -156,22 +150,9 @@ void ServoLoop::watch() {
   request.priority = std::min(request.priority + watch_priority, 99);
   request.pin = false;  // the servo's core may be the one that hangs
   const RealtimeThread realtime(request);
-  std::unique_lock lock(watch_mutex_);
-  while (!watch_wakes_.wait_for(lock, watch_interval, [this] { return watch_ends_; })) {
-    lock.unlock();
-    watchdog_.look(monotonic_now());
-    lock.lock();
-  }
+  while (!watch_end_.rest(watch_interval)) watchdog_.look(monotonic_now());
   device_.disable();  // this thread may have enabled it after it was to end
   watch_has_ended_.store(true, std::memory_order_release);
-}
-
-void ServoLoop::request_end_of_watch() {
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch_ends_ = true;
-  }
-  watch_wakes_.notify_all();
 }
 
 void ServoLoop::request_stop() noexcept {
@@ -193,7 +174,7 @@ bool ServoLoop::stop() {
         return zero_sent_.load(std::memory_order_acquire);
       });
   device_.disable();
-  request_end_of_watch();
+  watch_end_.give();
   const bool returns =
       wait_for(hang_time, [this] { return watch_has_ended_.load(std::memory_order_acquire); }) &&
       (sent || (thread_ ? thread_->try_stop(hang_time) : wait_for(hang_time, [this] {
@@ -216,28 +197,17 @@ void ServoLoop::finish() {
   ended_.store(true, std::memory_order_release);
 }
 
-DeviceStatus ServoLoop::device_status() const {
-  const std::uint32_t hand = statistics().hand.load(std::memory_order_relaxed);
+std::string ServoLoop::trouble() const {
+  if (std::string text = device_.fault_text(); !text.empty()) return text;
+  if (hangs_ && !ended_)
+    return "the method or the device's driver has not returned from its last tick: the device is "
+           "disabled, and that thread ends when it returns";
   const double silent = watchdog_.silence(monotonic_now());
-  DeviceStatus status{.ticking = started_ && !stopped_ && silent <= options_.watch_time,
-                      .present = (hand & hand_present) != 0,
-                      .fault = fault_of(hand),
-                      .text = device_.fault_text()};
-  if (!status.text.empty()) return status;
-  if (hangs_ && !ended_) {
-    status.text =
-        "the method or the device's driver has not returned from its last tick: the "
-        "device is disabled, and that thread ends when it returns";
-    return status;
-  }
-  if (started_ && !stopped_ && !status.ticking) {
-    status.text = "no tick for " + std::to_string(std::lround(1e3 * silent)) +
-                  " ms: the device is disabled until ticks resume";
-    return status;
-  }
-  status.text = watchdog_.refusal();
-  if (status.text.empty()) status.text = describe(status.fault);
-  return status;
+  if (started_ && !stopped_ && silent > options_.watch_time)
+    return "no tick for " + std::to_string(std::lround(1e3 * silent)) +
+           " ms: the device is disabled until ticks resume";
+  if (std::string text = watchdog_.refusal(); !text.empty()) return text;
+  return std::string(describe(fault_of(statistics().hand.load(std::memory_order_relaxed))));
 }
 
 }  // namespace palpate

@@ -2,15 +2,14 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 
 #include "palpate/servo/cycle.hpp"
+#include "palpate/servo/end_signal.hpp"
 #include "palpate/servo/force_watchdog.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 
@@ -25,14 +24,6 @@ struct ServoOptions {
   /// [s] 0.005 to 1: without a tick for so long the device is disabled; while a force is out, after
   /// ForceWatchdog::Limits::force_time or this, whichever is shorter.
   double watch_time = 0.025;
-};
-
-/// How the device does, as far as the loop knows.
-struct DeviceStatus {
-  bool ticking = false;                   ///< a tick began within the last ServoOptions::watch_time
-  bool present = false;                   ///< in the last tick
-  DeviceFault fault = DeviceFault::none;  ///< in the last tick
-  std::string text;  ///< why there is no force and what to do; empty if the device is well
 };
 
 /// The live loop: cycles on a real-time thread of their own, or on the thread of a device that
@@ -83,17 +74,14 @@ class ServoLoop {
   }
   /// [Hz] of the ticks: the options', or that of a device that drives them.
   [[nodiscard]] double rate() const { return rate_; }
-  /// How often the device was disabled because no tick came.
-  [[nodiscard]] std::uint64_t stalls() const { return watchdog_.stalls(); }
-  /// Any thread but the servo's.
-  [[nodiscard]] DeviceStatus device_status() const;
+  /// Why the device gives no force and what to do; empty if it is well. Any thread but the servo's.
+  [[nodiscard]] std::string trouble() const;
 
  private:
   void driven_tick() noexcept;
   void start_driven();
   void beat(double now) noexcept;
   void watch();
-  void request_end_of_watch();
   void finish();
 
   Device& device_;
@@ -119,9 +107,7 @@ class ServoLoop {
 
   ForceWatchdog watchdog_;
   std::thread watch_;
-  std::mutex watch_mutex_;  // the servo never takes it
-  std::condition_variable watch_wakes_;
-  bool watch_ends_ = false;  // guarded by watch_mutex_
+  EndSignal watch_end_;
   std::atomic<bool> watch_has_ended_{false};
 };
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -13,6 +12,7 @@
 
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -55,12 +55,6 @@ class MachineClock final : public FeedClock {
   }
 };
 
-std::string fixed(double value, int digits) {
-  std::array<char, 32> text{};
-  const auto format = std::chars_format::fixed;
-  return {text.data(), std::to_chars(text.begin(), text.end(), value, format, digits).ptr};
-}
-
 // Are two captures the same to the bit? Points of clouds are not compared.
 bool is_same_picture(const Cloud* a, const Cloud* b) {
   if (a == b) return a != nullptr;
@@ -84,8 +78,9 @@ std::string doubt_of(const Cloud& cloud, const DepthRange& range) {
   const double share = static_cast<double>(elsewhere) / static_cast<double>(measured + 1);
   if (measured < fewest_points || share <= most_elsewhere) return {};
   return std::to_string(std::lround(100.0 * share)) +
-         " % of its points are outside the camera's measuring range (" + fixed(range.nearest, 2) +
-         " to " + fixed(range.farthest, 2) + " m): check the unit of its depth values";
+         " % of its points are outside the camera's measuring range (" +
+         fixed_text(range.nearest, 2) + " to " + fixed_text(range.farthest, 2) +
+         " m): check the unit of its depth values";
 }
 
 }  // namespace
@@ -169,7 +164,7 @@ class CameraFeed::Worker {
     const double time = now();
     CameraStatus status = status_;
     if (status.recorded == 1) status.kind += ", one frame";
-    const std::string silent = fixed(time - last_heard_, 1) + " s";
+    const std::string silent = fixed_text(time - last_heard_, 1) + " s";
     const bool hangs = read_until_ && time > *read_until_ + hang_margin;
     if (is_stopping_) status.state = CameraState::stopped;
     status.text = state_words[static_cast<std::size_t>(status.state)];
@@ -344,7 +339,7 @@ class CameraFeed::Worker {
       const double silent = end - last_heard_;
       if (silent >= options_.waiting) player_.status().state = CameraState::waiting;
       if (silent >= (is_starting_ ? options_.start_up : options_.silence)) {
-        look_again("it has delivered nothing for " + fixed(silent, 1) + " s");
+        look_again("it has delivered nothing for " + fixed_text(silent, 1) + " s");
         last_heard_ = now();  // a source that cannot be opened again gets its time once more
         return;
       }
@@ -492,9 +487,7 @@ bool CameraFeed::stop(double timeout) {
 }
 
 void CameraFeed::set_playback(const Playback& playback) {
-  if (!(playback.speed >= Playback::slowest && playback.speed <= Playback::fastest))
-    throw Error("playback", "a speed of " + number_text(playback.speed) + " is out of range",
-                "give " + number_text(Playback::slowest) + " to " + number_text(Playback::fastest));
+  check_range("playback", "speed", "-", Playback::slowest, Playback::fastest, playback.speed);
   worker_->set_playback(playback);
 }
 

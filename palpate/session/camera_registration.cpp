@@ -40,12 +40,9 @@ constexpr double noise_margin = 4.0;  // times that variance: noise of pixels go
 std::optional<Vec3> point_at(const DepthImage& image, int u, int v) {
   const Intrinsics& lens = image.intrinsics();
   if (u < 0 || v < 0 || u >= lens.width || v >= lens.height) return {};
-  const std::uint16_t raw =
-      image.depth()[static_cast<std::size_t>(v) * static_cast<std::size_t>(lens.width) +
-                    static_cast<std::size_t>(u)];
+  const double z = image.depth_at(u, v);
   const Eigen::Vector2d ray = image.rays().ray(u, v);
-  if (!is_measured(raw) || !ray.allFinite()) return {};
-  const double z = raw / image.units_per_metre();
+  if (z == 0.0 || !ray.allFinite()) return {};
   return Vec3(z * ray.x(), z * ray.y(), z);
 }
 

@@ -20,10 +20,7 @@ std::vector<std::unique_ptr<Source>> opened(const std::vector<std::string>& uris
   return sources;
 }
 
-void check_rate(double rate) {
-  if (!(rate >= 1.0 && rate <= 100000.0))
-    throw Error("rate", std::to_string(rate) + " Hz is not a tick rate", "give 1 to 100000");
-}
+void check_rate(double rate) { check_range("rate", "", "Hz", 1.0, 1e5, rate); }
 
 }  // namespace
 

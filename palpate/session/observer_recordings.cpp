@@ -42,15 +42,14 @@ double size_of(const std::filesystem::path& folder) {
 
 ObserverRecordings::ObserverRecordings(Session& session, RecordingRules rules)
     : session_(session), rules_(std::move(rules)) {
-  if (rules_.own_thread) thread_ = std::thread([this] { watch(); });
+  if (!rules_.own_thread) return;
+  thread_ = std::thread([this] {
+    while (!end_.rest(std::chrono::duration<double>(rules_.interval))) look();
+  });
 }
 
 ObserverRecordings::~ObserverRecordings() {
-  {
-    const std::lock_guard lock(mutex_);
-    ends_ = true;
-  }
-  wakes_.notify_all();
+  end_.give();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -68,13 +67,10 @@ void ObserverRecordings::start() {
     throw Error("recording", reason, "free some space, or start another session");
   const std::filesystem::path folder = new_folder(rules_.folder);
   session_.start_recording(folder.string());
-  {
-    const std::lock_guard lock(mutex_);
-    folders_.push_back(folder);
-    ended_.clear();
-    watching_ = true;
-  }
-  wakes_.notify_all();
+  const std::lock_guard lock(mutex_);
+  folders_.push_back(folder);
+  ended_.clear();
+  watching_ = true;
 }
 
 void ObserverRecordings::stop() {
@@ -101,21 +97,6 @@ void ObserverRecordings::look() {
   const std::lock_guard lock(mutex_);
   ended_ = "the recording was ended: " + reason;
   watching_ = false;
-}
-
-void ObserverRecordings::watch() {
-  const std::chrono::duration<double> interval(rules_.interval);
-  std::unique_lock lock(mutex_);
-  while (!ends_) {
-    if (!watching_) {
-      wakes_.wait(lock, [this] { return ends_ || watching_; });
-      continue;
-    }
-    lock.unlock();
-    look();
-    lock.lock();
-    wakes_.wait_for(lock, interval, [this] { return ends_; });
-  }
 }
 
 std::optional<double> ObserverRecordings::room() const {

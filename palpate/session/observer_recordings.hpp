@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <condition_variable>
 #include <filesystem>
 #include <mutex>
 #include <optional>
@@ -9,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "palpate/servo/end_signal.hpp"
 #include "palpate/session/session.hpp"
 
 namespace palpate {
@@ -44,18 +44,16 @@ class ObserverRecordings {
   [[nodiscard]] std::optional<double> room() const;
 
  private:
-  void watch();
   std::string reason_to_end();  // empty: none
 
   Session& session_;
   const RecordingRules rules_;
   mutable std::mutex mutex_;
-  std::condition_variable wakes_;
   std::vector<std::filesystem::path> folders_;  // guarded by mutex_: of all that were begun
   std::string ended_;                           // guarded by mutex_
   std::optional<double> room_;                  // guarded by mutex_
   bool watching_ = false;                       // guarded by mutex_
-  bool ends_ = false;                           // guarded by mutex_
+  EndSignal end_;
   std::thread thread_;
 };
 

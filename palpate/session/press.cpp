@@ -12,7 +12,7 @@
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 
 namespace palpate {
 namespace {
@@ -95,12 +95,6 @@ std::optional<Pixel> nearest_surface(const DepthImage& image, Pixel pixel, doubl
     return is_firm(image, {u, v}, radius);
   });
   return firm ? firm : nearest_pixel(image.intrinsics(), pixel, is_measured_there);
-}
-
-void check(const char* name, double value, double min, double max, const char* unit) {
-  if (value >= min && value <= max) return;
-  throw Error(name, shortest(value) + " " + unit + " is out of range",
-              "give " + shortest(min) + " to " + shortest(max) + " " + unit);
 }
 
 }  // namespace
@@ -188,11 +182,11 @@ std::optional<Press::Line> Press::look_on_the_way() {
 
 Press::Press(const Cloud& first, Pixel at, const PressOptions& options)
     : options_(options), asked_(at), cloud_(&first), behind_(-options.approach) {
-  check("press depth", options.depth, 0.0, 0.1, "m");
-  check("press speed", options.speed, 1e-3, 2.0, "m/s");
-  check("press approach", options.approach, 1e-3, 1.0, "m");
-  check("press hold", options.hold, 0.0, 60.0, "s");
-  check("press patience", options.patience, 0.0, 600.0, "s");
+  check_range("press depth", "", "m", 0.0, 0.1, options.depth);
+  check_range("press speed", "", "m/s", 1e-3, 2.0, options.speed);
+  check_range("press approach", "", "m", 1e-3, 1.0, options.approach);
+  check_range("press hold", "", "s", 0.0, 60.0, options.hold);
+  check_range("press patience", "", "s", 0.0, 600.0, options.patience);
   Intrinsics size;
   if (const PointCloud* points = first.point_cloud()) {
     view_ = proposed_view(*points);

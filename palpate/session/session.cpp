@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <future>
 #include <limits>
 #include <map>
@@ -139,9 +138,7 @@ Session::Session(SessionOptions options) : options_(std::move(options)) {
   if (options_.cameras.size() > Patch::max_views)
     throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
                 "give at most " + std::to_string(Patch::max_views));
-  if (!is_live() && !(options_.rate >= 1.0 && options_.rate <= 100'000.0))
-    throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
-                "give a rate from 1 to 100000 Hz");
+  if (!is_live()) check_range("servo rate", "", "Hz", 1.0, 100'000.0, options_.rate);
   settings_ = {.method = options_.method,
                .parameters = options_.parameters,
                .safety = options_.safety,
@@ -177,9 +174,7 @@ Session::Session(SessionOptions options) : options_(std::move(options)) {
     hands_[i]->begin(open_method(settings_, first), settings_of(*hands_[i], settings_),
                      is_live() ? std::optional(servo) : std::nullopt);
   }
-  if (hands_.size() > 1) {
-    for (const auto& hand : hands_) hand->link(hands_);
-  }
+  for (const auto& hand : hands_) hand->link(hands_);
   if (!options_.record.empty()) open_recorder(options_.record, false);
 }
 
@@ -200,7 +195,9 @@ void Session::start() {
   started_ = true;
   for (std::size_t i = 0; i < feeds_.size(); ++i)
     feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); }, hand_place());
-  housekeeper_ = std::thread([this] { keep_house(); });
+  housekeeper_ = std::thread([this] {
+    while (!house_end_.rest(housekeeping_interval)) drain();
+  });
 }
 
 void Session::stop() noexcept {
@@ -213,11 +210,7 @@ void Session::stop() noexcept {
   // Zero force leaves first: nothing above this line may wait for anything.
   stop_loops();
   for (const auto& feed : feeds_) feed->request_stop();
-  {
-    const std::lock_guard lock(house_mutex_);
-    house_ends_ = true;
-  }
-  house_wakes_.notify_all();
+  house_end_.give();
   if (housekeeper_.joinable()) housekeeper_.join();
   for (const auto& feed : feeds_) static_cast<void>(feed->join(camera_join_time));
   {
@@ -296,7 +289,7 @@ SessionState Session::state() {
   for (const auto& hand : hands_) {
     SessionHandState& told = state.hands.emplace_back();
     told.name = hand->name();
-    if (hand->loop() != nullptr) told.device = hand->loop()->device_status();
+    if (hand->loop() != nullptr) told.trouble = hand->loop()->trouble();
     const CycleStatistics& statistics = hand->cycle().statistics();
     for (std::size_t i = 0; i < safety_flag_count; ++i)
       told.interventions[i] = statistics.interventions[i].load();
@@ -458,8 +451,6 @@ void Session::open_hands(const Cloud& seen) {
                                   [](const auto& hand) { return hand->mouse() != nullptr; });
   if (mice > 1)
     throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
-  if (alone) return;
-  for (const auto& hand : hands_) hand->prepare_link();
 }
 
 std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,
@@ -627,15 +618,6 @@ void Session::wait_for_recorder() {
   }
 }
 
-void Session::keep_house() {
-  std::unique_lock lock(house_mutex_);
-  while (!house_wakes_.wait_for(lock, housekeeping_interval, [this] { return house_ends_; })) {
-    lock.unlock();
-    drain();
-    lock.lock();
-  }
-}
-
 void Session::drain() {
   const double r_c = proxy_radius_.load(std::memory_order_relaxed);
   const auto seen = newest_clouds();
@@ -759,18 +741,15 @@ void Session::report_closed(const std::vector<Recorder::Status>& parts) {
                          : "; " + part.folder.filename().string() + ": " +
                                std::to_string(part.ticks) + " ticks";
   }
-  std::array<char, 32> seconds{};
-  std::snprintf(seconds.data(), seconds.size(), "; %.1f s, ", recording_.seconds);
-  recording_.message = text + seconds.data() + size_text(recording_.bytes);
+  recording_.message =
+      text + "; " + fixed_text(recording_.seconds, 1) + " s, " + size_text(recording_.bytes);
 }
 
 std::string size_text(double bytes) {
   const auto [unit, name] = bytes >= 1e9   ? std::pair(1e9, "GB")
                             : bytes >= 1e6 ? std::pair(1e6, "MB")
                                            : std::pair(1e3, "kB");
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g %s", bytes / unit, name);
-  return text.data();
+  return number_text(bytes / unit, 3) + " " + name;
 }
 
 const Timing* Session::timing(std::size_t hand) const {

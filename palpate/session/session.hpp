@@ -3,7 +3,6 @@
 
 #include <array>
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
+#include "palpate/servo/end_signal.hpp"
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
 #include "palpate/session/config.hpp"
@@ -86,7 +86,7 @@ std::string size_text(double bytes);
 struct SessionHandState {
   std::string name;  ///< empty: it is the only one
   Placement placement;
-  DeviceStatus device;  ///< of a session in real time
+  std::string trouble;  ///< of a session in real time, as ServoLoop::trouble
   Summary summary;
   std::array<std::uint64_t, safety_flag_count> interventions{};
   std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`
@@ -243,7 +243,6 @@ class Session {
   void begin_free();
   std::optional<ServoTick> run_tick(std::int64_t number);
   void wait_for_recorder();
-  void keep_house();
   void drain();
   [[nodiscard]] bool is_recording() const { return hands_.front()->recorder != nullptr; }
   void open_recorder(const std::string& folder, bool is_on);
@@ -280,9 +279,7 @@ class Session {
   std::vector<Recording> closing_;  // guarded by control_
   std::atomic<double> proxy_radius_{ProxyParameters{}.r_c()};
   std::thread housekeeper_;
-  std::mutex house_mutex_;
-  std::condition_variable house_wakes_;
-  bool house_ends_ = false;  // guarded by house_mutex_
+  EndSignal house_end_;
   std::atomic<bool> stop_requested_{false};
 };
 

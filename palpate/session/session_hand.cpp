@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "palpate/io/devices/mouse_device.hpp"
-#include "palpate/servo/linked_device.hpp"
 
 namespace palpate {
 
@@ -29,12 +28,6 @@ SessionHand::~SessionHand() {
   std::thread([left = std::move(left)]() mutable { left.reset(); }).detach();
 }
 
-void SessionHand::prepare_link() {
-  auto linked = std::make_unique<LinkedDevice>(std::move(device_));
-  linked_ = linked.get();
-  device_ = std::move(linked);
-}
-
 void SessionHand::begin(std::shared_ptr<Method> method, const ServoSettings& settings,
                         const std::optional<ServoOptions>& servo) {
   if (servo) {
@@ -53,8 +46,8 @@ void SessionHand::link(std::span<const std::unique_ptr<SessionHand>> hands) {
   for (const auto& hand : hands) {
     if (hand.get() != this) others.push_back(hand->cycle().shared_statistics());
   }
-  linked_->link(std::move(others), loop_ ? ForceWatchdog::Limits().force_time
-                                         : std::numeric_limits<double>::infinity());
+  cycle_->link(std::move(others), loop_ ? ForceWatchdog::Limits().force_time
+                                        : std::numeric_limits<double>::infinity());
 }
 
 std::optional<ServoTick> SessionHand::run_at(double t) {

@@ -13,7 +13,6 @@
 
 namespace palpate {
 
-class LinkedDevice;
 class MouseDevice;
 
 /// One hand of a session: its device, its cycle, in a loop of its own or on the session's clock,
@@ -27,13 +26,11 @@ class SessionHand {
   /// Leaves loop and device to a thread of their own if a cycle hangs.
   ~SessionHand();
 
-  /// Puts the device behind a LinkedDevice, for `link`. Before `begin`.
-  void prepare_link();
   /// Makes the cycle. @param servo  of a loop in real time; none: `run_at` runs the cycle
   /// @throws Error as Cycle and ServoLoop
   void begin(std::shared_ptr<Method> method, const ServoSettings& settings,
              const std::optional<ServoOptions>& servo);
-  /// After `begin` of both: no force while `other` is in trouble. See LinkedDevice.
+  /// After `begin` of all, before a tick: no force while another one is in trouble (Cycle::link).
   void link(std::span<const std::unique_ptr<SessionHand>> hands);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -55,7 +52,6 @@ class SessionHand {
   std::string name_;
   std::unique_ptr<Device> device_;
   MouseDevice* mouse_;
-  LinkedDevice* linked_ = nullptr;                  // the same as device_, if it is one
   std::unique_ptr<ServoLoop> loop_;                 // in real time
   std::unique_ptr<Cycle> free_cycle_;               // free-running
   Cycle* cycle_ = nullptr;                          // of one of these

@@ -58,8 +58,6 @@ class StampPlacer {
   /// Begins again, as after the camera was opened again; times continue increasing.
   void restart(StampClock clock);
 
-  /// [s] from the camera's clock to CLOCK_MONOTONIC.
-  [[nodiscard]] double offset() const { return offset_; }
   /// [s] usual time from capture to arrival, less the least latency where the offset is estimated.
   [[nodiscard]] double latency() const { return latency_; }
 

@@ -589,6 +589,20 @@ TEST(DepthImage, RefusesWhatCannotBeACamera) {
   EXPECT_THROW(DepthImage(rays, std::vector<std::uint16_t>(16), 1000.0, sheared), Error);
 }
 
+TEST(PointCloud, RefusesASurfaceWhosePartsDoNotFitItsPoints) {
+  const std::vector<Vec3> points(3, Vec3::Zero());
+  const auto made = [&](const Surface& surface) { return PointCloud(surface).size(); };
+  EXPECT_TRUE(test::fails_saying(
+      [&] {
+        return made({.points = points, .triangles = {{0, 1, 3}}});
+      },
+      "surface", "vertex number"));
+  EXPECT_TRUE(test::fails_saying([&] { return made({.points = points, .columns = 2, .rows = 2}); },
+                                 "surface", "columns times rows"));
+  EXPECT_TRUE(test::fails_saying(
+      [&] { return made({.points = points, .normals = {Vec3::UnitZ()}}); }, "surface", "normals"));
+}
+
 TEST(DepthImage, SaysHowNoisyTheReadingIsThatSawAPlace) {
   Intrinsics k{.width = 40, .height = 30, .fx = 40, .fy = 40, .cx = 19.5, .cy = 14.5};
   Eigen::Isometry3d pose(Eigen::Translation3d(0.1, -0.2, 0.3));

@@ -28,7 +28,7 @@ TEST(Tick, IsAllZeroUnlessItIsSaidOtherwise) {
 
 TEST(Tick, NamesEveryFlagOnce) {
   std::vector<std::string> names;
-  for (const TickFlagInfo& row : tick_flag_table()) {
+  for (const FlagInfo& row : tick_flag_table()) {
     names.emplace_back(row.name);
     EXPECT_FALSE(row.meaning.empty()) << row.name;
   }

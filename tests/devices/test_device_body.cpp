@@ -2,7 +2,9 @@
 // The simulated hand on a device with mass, damping, friction, resolution and delay, against closed
 // forms.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <random>
 #include <string>
@@ -278,6 +280,31 @@ TEST(SimulatedHand, TurnsAsASpringAndDamperDoUnderATorque) {
   }
   hand.disable();
   EXPECT_LT(angle(0.2).norm(), 0.01) << "springs back";
+}
+
+// Leaves what is no number where the next calls have their variables.
+[[gnu::noinline]] void spoil_stack() {
+  std::array<volatile double, 256> left;
+  for (auto& number : left) number = std::numeric_limits<double>::quiet_NaN();
+}
+
+TEST(SimulatedHand, TakesEveryForceThatComesWithoutATorque) {
+  DeviceBody body = plain;
+  body.inertia = 1e-4;
+  SimulatedHand one(resting_at(Vec3::Zero()), {.body = body});
+  SimulatedHand other(resting_at(Vec3::Zero()), {.body = body});
+  Device& device = one;
+  for (int i = 0; i < 200; ++i) {
+    const double t = i * ms;
+    const HandState hand = device.read(t);
+    const HandState same = other.read(t);
+    ASSERT_EQ(hand.position, same.position) << i;
+    ASSERT_EQ(hand.orientation->coeffs(), same.orientation->coeffs()) << i;
+    const Vec3 force(0.01 * i, 0, -1);
+    spoil_stack();
+    device.write(force, t);
+    other.write(Wrench{force, Vec3::Zero()}, t);
+  }
 }
 
 TEST(SimulatedHand, IsTurnedAsItsPathWhereItsHandleDoesNotTurnByItself) {

@@ -292,7 +292,7 @@ TEST_F(RosNodeTest, RefusesWhatIsNoName) {
         << name;
   EXPECT_TRUE(
       test::fails_saying([&] { return make_ros_node(*session_, RosNodeOptions{.rate = 0.0}); },
-                         "--publish-rate", "too low", "1 to 1000"));
+                         "--publish-rate", "out of range", "1 to 1000"));
 }
 
 }  // namespace test_ros_node

@@ -18,7 +18,6 @@
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/kernel/tool/shape_touch.hpp"
 #include "palpate/servo/cycle.hpp"
-#include "palpate/servo/linked_device.hpp"
 
 #include "tests/servo/fake_device.hpp"
 #include "tests/support/grids.hpp"
@@ -33,7 +32,7 @@ namespace palpate::test {
 /// book-keeping.
 class Adversary {
  public:
-  explicit Adversary(std::uint64_t seed) : random_(seed), cycle_(spoiled(wall()), link_) {
+  explicit Adversary(std::uint64_t seed) : random_(seed), cycle_(spoiled(wall()), device_) {
     constexpr int width = 40, height = 30;
     auto rays = std::make_shared<const ViewingRays>(
         Intrinsics{.width = width, .height = height, .fx = 35, .fy = 35, .cx = 19.5, .cy = 14.5});
@@ -69,7 +68,7 @@ class Adversary {
     for (auto [hand, other] : {std::pair(&one, &two), std::pair(&two, &one)}) {
       hand->other_ =
           std::shared_ptr<const CycleStatistics>(std::shared_ptr<void>{}, &other->statistics());
-      hand->link_.link({hand->other_}, inf);
+      hand->cycle_.link({hand->other_}, inf);
     }
   }
 
@@ -177,7 +176,7 @@ class Adversary {
     void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
     void observe(const Observation& seen) noexcept override { method_->observe(seen); }
     void set_parameters(const Parameters& p) noexcept override { method_->set_parameters(p); }
-    Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+    Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip}, t); }
     Tick tick(const HandPose& hand, double t) noexcept override {
       Tick tick = method_->tick(hand, t);
       if (random_() % 3000 == 0) arm_ = any_arm();
@@ -464,10 +463,7 @@ class Adversary {
   }
 
   std::mt19937_64 random_;
-  std::unique_ptr<FakeDevice> made_ =
-      std::make_unique<FakeDevice>(DeviceLimits{.max_torque = max_torque});
-  FakeDevice& device_ = *made_;
-  LinkedDevice link_{std::move(made_)};
+  FakeDevice device_{DeviceLimits{.max_torque = max_torque}};
   Cycle cycle_;
   std::shared_ptr<const CycleStatistics> other_;
   TickRing<ServoTick>::Reader ticks_seen_ = cycle_.reader();

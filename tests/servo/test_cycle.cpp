@@ -554,18 +554,16 @@ TEST(Cycle, SaysThatAFrameIsLateWhateverTheClockOfWhoPutIt) {
   }
 }
 
-TEST(Cycle, KeepsTheLargestForceAndTheAgesOfFramesInItsStatistics) {
+TEST(Cycle, SaysWhetherAForceIsOut) {
   Session session;
   session.run_for(2.0);
   const CycleStatistics& statistics = session.cycle.statistics();
   EXPECT_FALSE(statistics.force_out);
-  EXPECT_GT(statistics.frame_age.count(), 1900U);
-  const double pressed = session.press_to(-0.002).force.norm();
+  session.press_to(-0.002);
   EXPECT_TRUE(statistics.force_out);
   session.device.hand.position.z() = 0.02;
   session.run_for(0.1);
   EXPECT_FALSE(statistics.force_out);
-  EXPECT_GE(statistics.max_force.load(), pressed);
 }
 
 // Hazard: late-loop
@@ -682,11 +680,6 @@ TEST(Cycle, CountsWhatItDid) {
   session.press_to(-0.002);
   const CycleStatistics& statistics = session.cycle.statistics();
   EXPECT_EQ(statistics.ticks, static_cast<std::uint64_t>(session.device.writes));
-  EXPECT_GT(statistics.steps, 0U);
-  EXPECT_GT(statistics.contact_ticks, 0U);
-  EXPECT_LT(statistics.contact_ticks, statistics.ticks);
-  EXPECT_GT(statistics.max_force, 1.0);
-  EXPECT_LT(statistics.frame_age.max(), 40'000'000U);
   EXPECT_EQ(statistics.interventions[6], 1U) << "disengaged once, at the start";
 }
 
@@ -714,6 +707,7 @@ TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
     inside += calls_inside.count();
   };
   std::uint64_t contacts = 0;
+  ServoTick record{};
   for (int i = 0; i < 4000; ++i) {
     session.t += i % 1000 == 999 ? 0.02 : ms;
     if (i % 33 == 0) {
@@ -735,7 +729,8 @@ TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
     if (i % 500 == 0) session.cycle.set_settings({});
     session.device.hand.position = {0.01 * std::sin(3 * i * ms), 0, 0.01 * std::cos(i * ms)};
     measured();
-    contacts = session.cycle.statistics().contact_ticks;
+    ASSERT_TRUE(session.reader.try_pop(record));
+    if (record.tick.state != ContactState::free_motion) ++contacts;
   }
   EXPECT_EQ(inside, 0U);
   EXPECT_GT(contacts, 500U) << "it must have touched all of that";

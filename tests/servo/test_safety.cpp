@@ -1133,14 +1133,14 @@ TEST(SafetyParameters, HaveATableThatKnowsEveryOneAndItsDefault) {
   }
   EXPECT_EQ(names.size() * sizeof(double), sizeof(SafetyParameters));
   EXPECT_NO_THROW(validate(defaults));
-  EXPECT_EQ(safety_flag_names().size(), safety_flag_count);
+  EXPECT_EQ(safety_flag_table().size(), safety_flag_count);
   std::set<std::string_view> flags;
-  for (std::size_t i = 0; i < safety_flag_count; ++i) {
-    EXPECT_TRUE(flags.insert(safety_flag_names()[i]).second) << safety_flag_names()[i];
-    EXPECT_GT(safety_flag_meanings()[i].size(), 20U) << safety_flag_names()[i];
+  for (const FlagInfo& row : safety_flag_table()) {
+    EXPECT_TRUE(flags.insert(row.name).second) << row.name;
+    EXPECT_GT(row.meaning.size(), 20U) << row.name;
   }
-  EXPECT_EQ(safety_flag_names()[std::countr_zero(unsigned{frame_late})], "frame_late");
-  EXPECT_EQ(safety_flag_names()[std::countr_zero(unsigned{fault_latched})], "fault_latched");
+  EXPECT_EQ(safety_flag_table()[std::countr_zero(unsigned{frame_late})].name, "frame_late");
+  EXPECT_EQ(flags_in(fault_latched, safety_flag_table()).at(0).name, "fault_latched");
 }
 
 // Hazard: bad-settings

@@ -133,7 +133,7 @@ TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
           stiffness < 900.0 ? stiffness + 1.0 : 100;
       loop.cycle().set_settings(settings);
       static_cast<void>(loop.timing().wake_up.quantile(0.99));
-      static_cast<void>(loop.statistics().max_force.load());
+      static_cast<void>(loop.statistics().heat.load());
     }
   });
   std::uint64_t seen = 0;

@@ -296,7 +296,7 @@ TEST(CameraFeed, RefusesAPlaceOrASpeedThatCannotBe) {
   CameraFeed feed(run.source(frames(3, 7.0), recording));
   EXPECT_TRUE(fails_saying([&] { feed.seek(1.1); }, "1.1"));
   EXPECT_TRUE(fails_saying([&] { feed.seek(std::nan("")); }, "position"));
-  EXPECT_TRUE(fails_saying([&] { feed.set_playback({.speed = 0.0}); }, "speed of 0"));
+  EXPECT_TRUE(fails_saying([&] { feed.set_playback({.speed = 0.0}); }, "speed': 0 is out"));
   EXPECT_TRUE(fails_saying([&] { feed.set_playback({.speed = 1e9}); }, "out of range"));
 }
 

@@ -24,7 +24,6 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/record/session_reader.hpp"
-#include "palpate/servo/linked_device.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
@@ -296,7 +295,7 @@ TEST(SessionHands, OfAGripperPushEachOtherApart) {
 }
 
 // Hazard: another-hand
-TEST(LinkedDevice, CallsTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
+TEST(LinkedHands, CallTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
   CycleStatistics hand;
   const double never = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(is_in_trouble(hand, 5.0, never)) << "its first tick is yet to come";
@@ -400,10 +399,10 @@ TEST(LiveSessionHands, LetGoWhereOneOfThemHangsAndAllEndTogether) {
   EXPECT_TRUE(comes_true(sees_it));
   EXPECT_TRUE(comes_true([&] { return !one->force_out && !other->force_out; }));
   EXPECT_TRUE(comes_true([&] {
-    return session.state().hands[0].device.text == describe(DeviceFault::another_hand);
-  })) << session.state().hands[0].device.text;
+    return session.state().hands[0].trouble == describe(DeviceFault::another_hand);
+  })) << session.state().hands[0].trouble;
   EXPECT_TRUE(
-      comes_true([&] { return session.state().hands[1].device.text.starts_with("no tick for"); }));
+      comes_true([&] { return session.state().hands[1].trouble.starts_with("no tick for"); }));
   for (int i = 0; i < 50; ++i) {
     ASSERT_FALSE(one->force_out);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -300,13 +300,12 @@ TEST(LiveSession, TakesTheForceOfAMethodThatHangsAwayAndLeavesItsThreadBehind) {
     const auto is_disabled = [&] { return last_event_of_the_device(*log) == "disable"; };
     EXPECT_TRUE(comes_true(is_disabled)) << "before anybody stops the session";
     EXPECT_TRUE(comes_true([&] {
-      return session.state().hands[0].device.text.starts_with("no tick for");
-    })) << session.state().hands[0].device.text;
+      return session.state().hands[0].trouble.starts_with("no tick for");
+    })) << session.state().hands[0].trouble;
     session.stop();  // returns although the method hangs
     EXPECT_TRUE(is_disabled());
-    EXPECT_TRUE(
-        session.state().hands[0].device.text.starts_with("the method or the device's driver"))
-        << session.state().hands[0].device.text;
+    EXPECT_TRUE(session.state().hands[0].trouble.starts_with("the method or the device's driver"))
+        << session.state().hands[0].trouble;
     session.stop();
   }
   gate->open();

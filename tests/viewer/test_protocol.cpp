@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/viewer/protocol.hpp"
 
@@ -29,20 +31,19 @@ std::vector<std::byte> hand_bytes(std::uint8_t held, const Vec3& target) {
   return bytes;
 }
 
+// An image of 3 x 2 pixels.
+std::shared_ptr<const DepthImage> small_image() {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Vec3(1.0, 2.0, 3.0);
+  return std::make_shared<const DepthImage>(
+      std::make_shared<const ViewingRays>(
+          Intrinsics{.width = 3, .height = 2, .fx = 525.0, .fy = 525.0, .cy = 239.5}),
+      std::vector<std::uint16_t>{0, 700, 65535, 701, 702, 703}, 1000.0, pose);
+}
+
 TEST(Protocol, SendsADepthImageAsItLiesInMemory) {
-  const auto depth = std::make_shared<const std::vector<std::uint16_t>>(
-      std::vector<std::uint16_t>{0, 700, 65535, 701, 702, 703});
-  FrameHeader header;
-  header.camera = 3;
-  header.number = 41;
-  header.stamp = 12.5;
-  header.width = 3;
-  header.height = 2;
-  header.fx = 525.0;
-  header.cy = 239.5;
-  header.metres_per_unit = 0.001;
-  header.world_from_camera.translation() = Vec3(1.0, 2.0, 3.0);
-  const ViewerMessage message = depth_message(header, *depth, depth);
+  const auto image = small_image();
+  const ViewerMessage message = frame_message(3, 41, {.stamp = 12.5, .cloud = image});
   ASSERT_EQ(message.head.size(), 96u);
   EXPECT_FALSE(message.text);
   EXPECT_EQ(at<std::uint8_t>(message.head, 0), 1);
@@ -58,57 +59,77 @@ TEST(Protocol, SendsADepthImageAsItLiesInMemory) {
   EXPECT_EQ(at<float>(message.head, 44), 1.0F);           // row 0: rotation ...
   EXPECT_EQ(at<float>(message.head, 44 + 4 * 3), 1.0F);   // ... and translation
   EXPECT_EQ(at<float>(message.head, 44 + 4 * 11), 3.0F);  // row 2
-  EXPECT_EQ(static_cast<const void*>(message.payload.data()), depth->data()) << "it was copied";
+  EXPECT_EQ(static_cast<const void*>(message.payload.data()), image->depth().data())
+      << "it was copied";
   EXPECT_EQ(message.payload.size(), 12u);
 }
 
 TEST(Protocol, SendsColoursAsTheyLieInMemoryAndSaysWhose) {
-  const std::vector<std::uint16_t> depth(6);
   auto colour = std::make_shared<ColourImage>();
   colour->width = 3;
   colour->height = 2;
   colour->rgb.assign(18, 7);
-  FrameHeader header{.width = 3, .height = 2, .colour = colour};
-  const ViewerMessage registered = depth_message(header, depth, nullptr);
+  const Frame frame{.cloud = small_image(), .colour = colour};
+  const ViewerMessage registered = frame_message(0, 0, frame);
   EXPECT_EQ(at<std::uint8_t>(registered.head, 3), 1);
   EXPECT_EQ(registered.head.size(), 96u);
   EXPECT_EQ(registered.colour, colour) << "it was copied";
-  header.height = 1;
-  EXPECT_THROW(depth_message(header, std::span(depth).first(3), nullptr), Error);
+  colour->height = 1;
+  colour->rgb.resize(9);
+  EXPECT_THROW(frame_message(0, 0, frame), Error);
   colour->camera = ColourImage::Camera{};
   colour->camera->intrinsics.fx = 400.0;
   colour->camera->world_from_camera.translation() = Vec3(1.0, 2.0, 3.0);
-  const ViewerMessage own = depth_message(header, std::span(depth).first(3), nullptr);
+  const ViewerMessage own = frame_message(0, 0, frame);
   EXPECT_EQ(at<std::uint8_t>(own.head, 3), 2);
   ASSERT_EQ(own.head.size(), 168u);
   EXPECT_EQ(at<std::uint32_t>(own.head, 96), 3u);
   EXPECT_EQ(at<float>(own.head, 104), 400.0F);
   EXPECT_EQ(at<float>(own.head, 120 + 4 * 3), -1.0F) << "from the world to the camera";
   colour->rgb.pop_back();
-  EXPECT_THROW(depth_message(header, std::span(depth).first(3), nullptr), Error);
-}
-
-TEST(Protocol, RefusesPayloadsOfAnotherSize) {
-  FrameHeader header;
-  header.width = 3;
-  header.height = 2;
-  const std::vector<std::uint16_t> depth(5);
-  EXPECT_THROW(depth_message(header, depth, nullptr), Error);
-  EXPECT_THROW(points_message(header, std::vector<float>(17)), Error);
-  EXPECT_THROW(rays_message(0, 3, 2, std::vector<float>(11)), Error);
+  EXPECT_THROW(frame_message(0, 0, frame), Error);
 }
 
 TEST(Protocol, PutsTheFacesOfAMeshBehindItsCorners) {
-  FrameHeader header;
-  header.width = 3;
-  const std::vector<std::uint32_t> faces = {2, 0, 1};
-  const ViewerMessage message = points_message(header, std::vector<float>(9, 0.5F), faces);
-  ASSERT_EQ(message.payload.size(), 9 * 4 + 3 * 4u);
+  // Of two faces the second has a corner that is nowhere, and the third point is before it.
+  Surface mesh;
+  mesh.points.assign(5, Vec3::Constant(0.5));
+  mesh.points[1] = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  mesh.points[4] = Vec3(1, 2, 3);
+  mesh.triangles = {{4, 0, 2}, {0, 1, 2}};
+  auto colour = std::make_shared<ColourImage>();
+  for (std::uint8_t i = 0; i < 15; ++i) colour->rgb.push_back(i);
+  colour->width = 5;
+  colour->height = 1;
+  const ViewerMessage message =
+      frame_message(0, 0, {.cloud = std::make_shared<PointCloud>(mesh), .colour = colour});
+  EXPECT_EQ(at<std::uint8_t>(message.head, 2), 2);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 16), 4u);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 20), 1u);
   EXPECT_EQ(at<std::uint32_t>(message.head, 92), 1u);
-  EXPECT_EQ(at<std::uint32_t>({message.payload.begin(), message.payload.end()}, 36), 2u);
-  EXPECT_EQ(at<std::uint32_t>(points_message(header, std::vector<float>(9)).head, 92), 0u);
-  const std::vector<std::uint32_t> beyond = {0, 1, 3};
-  EXPECT_THROW(points_message(header, std::vector<float>(9), beyond), Error);
+  const std::vector<std::byte> payload(message.payload.begin(), message.payload.end());
+  ASSERT_EQ(payload.size(), 12 * 4 + 3 * 4u);
+  EXPECT_EQ(at<float>(payload, 4 * 10), 2.0F);
+  EXPECT_EQ(at<std::uint32_t>(payload, 12 * 4), 3u);
+  EXPECT_EQ(at<std::uint32_t>(payload, 12 * 4 + 8), 1u);
+  ASSERT_EQ(message.colour->rgb.size(), 12u);
+  EXPECT_EQ(message.colour->rgb[3], 6);
+
+  const std::vector<Vec3> points(3, Vec3::Zero());
+  const ViewerMessage plain = frame_message(0, 0, {.cloud = std::make_shared<PointCloud>(points)});
+  EXPECT_EQ(at<std::uint32_t>(plain.head, 16), 3u);
+  EXPECT_EQ(at<std::uint32_t>(plain.head, 92), 0u);
+}
+
+TEST(Protocol, SendsTheRaysOfALensAndThePathOfAHand) {
+  const ViewingRays rays(Intrinsics{.width = 2, .height = 1, .fx = 2.0, .fy = 1.0, .cx = 0.5});
+  const ViewerMessage message = rays_message(2, rays);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 0), 3u | 2u << 8U);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 4), 2u);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 8), 1u);
+  const std::vector<std::byte> payload(message.payload.begin(), message.payload.end());
+  ASSERT_EQ(payload.size(), 16u);
+  EXPECT_EQ(at<float>(payload, 8), 0.25F);
   EXPECT_THROW(path_message(0, std::vector<float>(7)), Error);
   EXPECT_EQ(at<std::uint32_t>(path_message(0, std::vector<float>(8)).head, 4), 2u);
 }
@@ -130,7 +151,7 @@ TEST(Protocol, SendsTheSurfaceOfATool) {
 
 TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   TickBatch batch;
-  ServoTick& record = batch.tick;
+  ServoTick& record = batch.newest;
   record.tick.t = 100.0;
   record.tick.state = ContactState::contact;
   batch.flags = 5;

@@ -396,7 +396,7 @@ TEST(SessionHost, GivesTheHandAnotherToolThatItsPageTurns) {
   play(1.0, {true, Vec3(0.0, 0.0, 0.497), tilted});
   EXPECT_LT(newest.force.z(), -0.5);
   EXPECT_TRUE(newest.torque.isZero()) << "a mouse has no motors for it";
-  EXPECT_LT(shown.tick.torque.x(), -5e-3) << "the wall pushes the edge at +y back";
+  EXPECT_LT(shown.newest.torque.x(), -5e-3) << "the wall pushes the edge at +y back";
   // What it does not offer it makes, but a page opens no files.
   EXPECT_TRUE(fails_saying(hosted.asking(SetTool{"mesh:/etc/passwd.stl?unit=mm"}, Role::operating),
                            "cannot be read"));
@@ -410,7 +410,7 @@ TEST(SessionHost, GivesTheHandAnotherToolThatItsPageTurns) {
   play(1.0, {true, Vec3(0.0, 0.0, 0.45), tilted});
   play(1.0, {true, Vec3(0.0, 0.0, 0.505), tilted});
   EXPECT_LT(newest.force.z(), -0.5);
-  EXPECT_TRUE(shown.tick.torque.isZero());
+  EXPECT_TRUE(shown.newest.torque.isZero());
   hosted.session.stop();
   SessionReader reader(bag);
   EXPECT_TRUE(replay(reader).identical());

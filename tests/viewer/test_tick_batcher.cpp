@@ -36,7 +36,7 @@ TEST(TickBatcher, ShowsTheNewestTickAndForgetsNoFlag) {
   batcher.add(second, r_c);
   const auto batch = batcher.take();
   ASSERT_TRUE(batch);
-  EXPECT_EQ(batch->tick.tick.t, 1.001);
+  EXPECT_EQ(batch->newest.tick.t, 1.001);
   EXPECT_EQ(batch->flags, step_budget_hit | frame_stale);
   EXPECT_EQ(batch->safety, std::uint32_t{force_cut});
   batcher.add(tick_at(1.002), r_c);

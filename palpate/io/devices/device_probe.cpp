@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -48,12 +47,6 @@ class NoPoints final : public Cloud {
   void gather(const Beam& /*beam*/, std::size_t /*most*/,
               Patch& /*patch*/) const noexcept override {}
 };
-
-std::string rounded(double value, int decimals) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-  return text.data();
-}
 
 enum class End : int { none, done, too_far, too_fast, too_long, not_finite };
 
@@ -388,12 +381,12 @@ std::string text_of(End end, const ProbeOptions& options) {
     case End::done:
       return {};
     case End::too_far:
-      return "the handle went more than " + rounded(1e3 * options.travel, 0) +
+      return "the handle went more than " + fixed_text(1e3 * options.travel, 0) +
              " mm away: support its weight, or start in the centre of its workspace";
     case End::too_fast:
       return "the handle became faster than " + shortest(options.top_speed) + " m/s";
     case End::too_long:
-      return "it took more than " + rounded(options.time, 0) + " s";
+      return "it took more than " + fixed_text(options.time, 0) + " s";
     case End::not_finite:
       return "the device gave a position that is no number";
   }
@@ -469,22 +462,23 @@ void doubt(DeviceMeasurement& result) {
     ++axes;
     if (!tells_mass(*fit))
       result.doubts.push_back("along " + axis + " its mass and damping stay unknown: " +
-                              rounded(result.largest_force, 2) +
+                              fixed_text(result.largest_force, 2) +
                               " N is hardly more than its friction, or something holds it");
     if (fit->misfit > most_misfit)
       result.doubts.push_back("along " + axis + " it moves otherwise than a mass with friction: " +
-                              rounded(100.0 * fit->misfit, 0) + " % of the force is not explained");
+                              fixed_text(100.0 * fit->misfit, 0) +
+                              " % of the force is not explained");
     if (fit->spring.value > std::max(least_spring, fit->spring.error))
       result.doubts.push_back("along " + axis + " something holds it with " +
-                              rounded(fit->spring.value, 0) + " N/m: let go of the handle");
+                              fixed_text(fit->spring.value, 0) + " N/m: let go of the handle");
   }
   if (axes == 0)
-    result.doubts.push_back("it hardly moved under " + rounded(result.largest_force, 2) +
+    result.doubts.push_back("it hardly moved under " + fixed_text(result.largest_force, 2) +
                             " N: its friction is higher, or somebody holds it");
   else if (axes < 3)
     result.doubts.push_back("it moved along " + std::to_string(axes) + " of 3 axes only");
   if (result.rest_drift > most_drift)
-    result.doubts.push_back("it moved by " + rounded(1e3 * result.rest_drift, 1) +
+    result.doubts.push_back("it moved by " + fixed_text(1e3 * result.rest_drift, 1) +
                             " mm before any force was sent");
   if (!result.ended.empty()) result.doubts.push_back("it ended early: " + result.ended);
   if (result.stalls > 0 && !result.doubts.empty())

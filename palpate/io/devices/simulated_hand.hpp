@@ -62,7 +62,7 @@ class SimulatedHand final : public Device {
   [[nodiscard]] const HandModel& model() const { return model_; }
   /// Lets the time since the last read pass, at most 0.1 s of it. [servo]
   HandState read(double t) noexcept override;
-  void write(const Vec3& force, double t) noexcept override { write(Wrench{force, {}}, t); }
+  void write(const Vec3& force, double t) noexcept override { write(Wrench{.force = force}, t); }
   void write(const Wrench& wrench, double t) noexcept override;
   void enable() override { enabled_.store(true, std::memory_order_relaxed); }
   void disable() noexcept override { enabled_.store(false, std::memory_order_relaxed); }

@@ -11,11 +11,16 @@
 
 namespace palpate {
 
-std::string number_text(double value) {
+std::string number_text(double value, int digits) {
   std::array<char, 32> text{};
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 6);
-  return {text.data(), end.ptr};
+  const auto format = std::chars_format::general;
+  return {text.data(), std::to_chars(text.begin(), text.end(), value, format, digits).ptr};
+}
+
+std::string fixed_text(double value, int decimals) {
+  std::array<char, 320> text{};
+  const auto format = std::chars_format::fixed;
+  return {text.data(), std::to_chars(text.begin(), text.end(), value, format, decimals).ptr};
 }
 
 void check_range(std::string_view noun, std::string_view name, std::string_view unit, double min,
@@ -24,7 +29,7 @@ void check_range(std::string_view noun, std::string_view name, std::string_view 
       (!whole || std::floor(value) == value))
     return;
   const std::string shown = unit == "-" ? "" : " " + std::string(unit);
-  throw Error(std::string(noun) + " '" + std::string(name) + "'",
+  throw Error(std::string(noun) + (name.empty() ? "" : " '" + std::string(name) + "'"),
               number_text(value) + shown + " is out of range",
               std::string("give a ") + (whole ? "whole number" : "value") + " from " +
                   number_text(min) + " to " + number_text(max) + shown);

@@ -48,10 +48,13 @@ constexpr auto row_of(std::string_view name, std::string_view symbol, std::strin
   return ParameterRow<Owner>{name, symbol, unit, get(Owner{}), min, max, meaning, source, get, set};
 }
 
-/// A number as messages show it.
-std::string number_text(double value);
+/// A number as messages show it, to so many digits.
+std::string number_text(double value, int digits = 6);
+/// The same, to so many decimals: "0.50".
+std::string fixed_text(double value, int decimals);
 
 /// @param noun   what a row is, such as "parameter"
+/// @param name   empty: the noun says it
 /// @param whole  only whole numbers are allowed
 /// @throws Error if the value is not finite or not in [min, max].
 void check_range(std::string_view noun, std::string_view name, std::string_view unit, double min,

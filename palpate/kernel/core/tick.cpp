@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::array<TickFlagInfo, tick_flag_count> flag_table{{
+constexpr std::array<FlagInfo, tick_flag_count> flag_table{{
     {"step_budget_hit",
      "the proxy has not converged and continues in the next tick; raise step_budget"},
     {"patch_thinned", "more points were nearby than a patch can store; move the camera away"},
@@ -25,7 +25,15 @@ constexpr std::array<TickFlagInfo, tick_flag_count> flag_table{{
 
 }  // namespace
 
-std::span<const TickFlagInfo> tick_flag_table() { return flag_table; }
+std::span<const FlagInfo> tick_flag_table() { return flag_table; }
+
+std::vector<FlagInfo> flags_in(std::uint32_t bits, std::span<const FlagInfo> table) {
+  std::vector<FlagInfo> set;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if ((bits >> i & 1U) != 0) set.push_back(table[i]);
+  }
+  return set;
+}
 
 const char* to_string(ContactState state) noexcept {
   switch (state) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "palpate/kernel/core/hand.hpp"
 
@@ -64,12 +65,14 @@ enum TickFlag : std::uint32_t {
 constexpr std::size_t tick_flag_count = 13;
 
 /// A flag's name and what it means, for people.
-struct TickFlagInfo {
+struct FlagInfo {
   std::string_view name;     ///< such as "step_budget_hit"
   std::string_view meaning;  ///< one line, with the remedy where there is one
 };
 /// One row for each bit of `TickFlag`, in their order.
-std::span<const TickFlagInfo> tick_flag_table();
+std::span<const FlagInfo> tick_flag_table();
+/// The rows of such a table whose bits are set.
+std::vector<FlagInfo> flags_in(std::uint32_t bits, std::span<const FlagInfo> table);
 
 /// A place where a surface pushes a tool with a shape. In single precision, which is for telemetry.
 struct ContactPush {

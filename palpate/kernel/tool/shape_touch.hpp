@@ -29,7 +29,7 @@ class ShapeTouch final : public Method {
 
   void seat(const Vec3& proxy) noexcept override;
   void observe(const Observation& seen) noexcept override;
-  Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+  Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip}, t); }
   Tick tick(const HandPose& hand, double t) noexcept override;
   void set_parameters(const Parameters& parameters) noexcept override;
   /// @throws Error for points without an image, which have no lines of sight to look along.

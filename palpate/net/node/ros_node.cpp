@@ -5,11 +5,11 @@
 #include <array>
 #include <atomic>
 #include <cctype>
-#include <cstdio>
 #include <exception>
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -19,7 +19,6 @@
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 #include "palpate/net/node/node_parameters.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -34,19 +33,6 @@ constexpr dds::Quality reliable{.reliable = true, .depth = 10};
 constexpr dds::Quality newest_alone{.reliable = true};
 constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
 constexpr dds::Quality events{.reliable = true, .depth = 1000};  // as ROS's own
-
-// What a node says of the ticks since it said something last: the newest, and the flags of all.
-struct TickReport {
-  ServoTick newest{};
-  std::uint32_t flags = 0;   // TickFlag bits
-  std::uint32_t safety = 0;  // SafetyFlag bits
-
-  void add(const ServoTick& record) {
-    newest = record;
-    flags |= record.tick.flags;
-    safety |= record.safety;
-  }
-};
 
 struct SessionReport {
   SessionState state;
@@ -108,24 +94,13 @@ Marker arrow(const ros::Header& header, const std::string& name, const Vec3& fro
   return made;
 }
 
-std::string number(double value) {
-  std::array<char, 48> text{};
-  std::snprintf(text.data(), text.size(), "%.4g", value);
-  return text.data();
-}
+std::string number(double value) { return number_text(value, 4); }
 
-template <class Names>
-std::string names_of(std::uint32_t bits, const Names& names) {
+std::string names_of(std::uint32_t bits, std::span<const FlagInfo> table) {
   std::string text;
-  std::size_t i = 0;
-  for (const auto& name : names) {
-    if ((bits >> i++ & 1U) != 0) text += (text.empty() ? "" : " ") + std::string(name);
-  }
+  for (const FlagInfo& flag : flags_in(bits, table))
+    text += (text.empty() ? "" : " ") + std::string(flag.name);
   return text;
-}
-
-std::string tick_flags(std::uint32_t bits) {
-  return names_of(bits, palpate::names_of(tick_flag_table()));
 }
 
 DiagnosticStatus status(const std::string& name, std::uint8_t level, std::string message) {
@@ -182,15 +157,15 @@ DiagnosticStatus contact_status(const std::string& name, const TickReport& ticks
   if (held) made.message += "; the force is paused (~/release ends this)";
   if (hand.latched_by != 0) {
     made.level = DiagnosticStatus::error;
-    made.message = "no force: latched by " + names_of(hand.latched_by, safety_flag_names()) +
+    made.message = "no force: latched by " + names_of(hand.latched_by, safety_flag_table()) +
                    " (~/reset_faults ends that)";
   }
   made.values = {{"force asked for [N]", number(newest.tick.force.norm())},
                  {"force sent [N]", number(newest.force.norm())},
                  {"gain", number(newest.gain)},
                  {"age of the frame [s]", number(newest.frame_age)},
-                 {"flags", tick_flags(ticks.flags)},
-                 {"safety flags", names_of(ticks.safety, safety_flag_names())},
+                 {"flags", names_of(ticks.flags, tick_flag_table())},
+                 {"safety flags", names_of(ticks.safety, safety_flag_table())},
                  {"pop-throughs suspected", std::to_string(hand.summary.pop_throughs)}};
   return made;
 }
@@ -256,7 +231,7 @@ ros::DiagnosticArray diagnostics_of(const SessionReport& report, const ros::Head
     const SessionHandState& hand = state.hands[i];
     const std::string name = i == 0 ? "" : hand.name + " ";
     array.status.push_back(contact_status(name, ticks, hand, state.held));
-    array.status.push_back(device_status(name, ticks, hand.device.text, device));
+    array.status.push_back(device_status(name, ticks, hand.trouble, device));
   }
   array.status.push_back(recording_status(state.recording));
   return array;
@@ -287,9 +262,7 @@ NodeName checked_name(const std::string& text) {
 }
 
 double checked_rate(double rate) {
-  if (!(rate >= 1.0 && rate <= 1000.0))
-    throw Error("--publish-rate", number_text(rate) + " Hz is too low or too high",
-                "give 1 to 1000");
+  check_range("--publish-rate", "", "Hz", 1.0, 1000.0, rate);
   return rate;
 }
 

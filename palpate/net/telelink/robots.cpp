@@ -14,6 +14,7 @@
 #include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/core/tick.hpp"
 #include "palpate/net/telelink/topics.hpp"
+#include "palpate/servo/end_signal.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -94,7 +95,7 @@ class ToolInScene final : public SceneRobot {
     thread_ = std::thread([this] { run(); });
   }
   ~ToolInScene() override {
-    ends_ = true;
+    end_.give();
     thread_.join();
   }
 
@@ -124,8 +125,7 @@ class ToolInScene final : public SceneRobot {
     constexpr double step = 1e-3;     // [s]
     constexpr double longest = 0.05;  // [s] of a stall that is made up for
     double done = monotonic_now();
-    while (!ends_) {
-      std::this_thread::sleep_for(std::chrono::microseconds(500));
+    while (!end_.rest(std::chrono::microseconds(500))) {
       const double now = monotonic_now();
       done = std::max(done, now - longest);
       const std::lock_guard lock(mutex_);
@@ -148,7 +148,7 @@ class ToolInScene final : public SceneRobot {
   double commanded_ = -1e9;  // [s]
   bool led_ = false;
   std::atomic<double> ahead_{0.0};  // [s] the scene's time less the loop's
-  std::atomic<bool> ends_{false};
+  EndSignal end_;
   std::thread thread_;
 };
 

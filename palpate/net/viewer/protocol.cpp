@@ -2,12 +2,16 @@
 #include "palpate/net/viewer/protocol.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
+#include <tuple>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/rotation.hpp"
 
@@ -50,6 +54,13 @@ class Writer {
   Writer& put_float(double value) { return put(static_cast<float>(value)); }
   Writer& put_vec3(const Vec3& v) { return put_float(v.x()).put_float(v.y()).put_float(v.z()); }
   Writer& put_rotation(const Rotation& q) { return put_vec3(q.vec()).put_float(q.w()); }
+  Writer& put_lens(const Intrinsics& k) {
+    return put_float(k.fx).put_float(k.fy).put_float(k.cx).put_float(k.cy);
+  }
+  Writer& put_pose(const Eigen::Isometry3d& pose) {
+    for (int i = 0; i < 12; ++i) put_float(pose(i / 4, i % 4));
+    return *this;
+  }
 
  private:
   std::vector<std::byte>& out_;
@@ -62,46 +73,57 @@ Number read(std::span<const std::byte> message, std::size_t at) {
   return value;
 }
 
-Writer& put_pose(Writer& writer, const Eigen::Isometry3d& pose) {
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) writer.put_float(pose(row, column));
-  }
-  return writer;
+std::size_t pixels_of(int width, int height) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
 
-ViewerMessage frame_message(const FrameHeader& header, Format format,
-                            std::span<const std::byte> payload, std::shared_ptr<const void> owner,
-                            std::uint32_t triangles = 0) {
-  ViewerMessage message;
-  Writer writer(message.head);
-  const ColourImage* colour = header.colour.get();
-  const Colours colours = colour == nullptr ? Colours::none
-                          : colour->camera  ? Colours::own_camera
-                                            : Colours::registered;
-  if (colour != nullptr) {
-    const auto count =
-        static_cast<std::size_t>(colour->width) * static_cast<std::size_t>(colour->height);
-    if (colour->rgb.size() != 3 * count ||
-        (!colour->camera && count != std::size_t{header.width} * header.height))
-      throw Error("colour for the viewer", "its size is not that of its image");
+void append(const Vec3& v, std::vector<float>& numbers) {
+  for (const double number : v) numbers.push_back(static_cast<float>(number));
+}
+
+// Behind the points, in the same payload.
+void append(const std::array<std::uint32_t, 3>& triangle, std::vector<float>& numbers) {
+  for (const std::uint32_t corner : triangle) numbers.push_back(std::bit_cast<float>(corner));
+}
+
+// What is drawn of points without an image.
+struct DrawnPoints {
+  std::vector<float> numbers = {};  // x y z of each, then of each face its corners
+  std::size_t points = 0;
+  std::uint32_t faces = 0;
+  std::shared_ptr<const ColourImage> colour = {};  // of each
+};
+
+DrawnPoints drawn_points(const PointCloud& cloud, const ColourImage* colour) {
+  DrawnPoints drawn;
+  const Surface* surface = cloud.surface();
+  if (surface == nullptr) {
+    for (std::size_t i = 0; i < cloud.size(); ++i) append(cloud.point(i), drawn.numbers);
+    drawn.points = cloud.size();
+    return drawn;
   }
-  writer.put(Kind::frame).put(header.camera).put(format).put(colours);
-  writer.put(header.number).put(header.stamp).put(header.width).put(header.height);
-  writer.put_float(header.fx).put_float(header.fy).put_float(header.cx).put_float(header.cy);
-  writer.put_float(header.metres_per_unit);
-  put_pose(writer, header.world_from_camera).put(triangles);
-  if (colours == Colours::own_camera) {
-    const Intrinsics& k = colour->camera->intrinsics;
-    writer.put(static_cast<std::uint32_t>(colour->width));
-    writer.put(static_cast<std::uint32_t>(colour->height));
-    writer.put_float(k.fx).put_float(k.fy).put_float(k.cx).put_float(k.cy);
-    put_pose(writer, colour->camera->world_from_camera.inverse());
+  const std::vector<Vec3>& all = surface->points;
+  const bool has_colour = colour != nullptr && colour->rgb.size() == 3 * all.size();
+  auto kept = has_colour ? std::make_shared<ColourImage>() : nullptr;
+  std::vector<std::uint32_t> place(all.size());  // among those that are finite
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    place[i] = static_cast<std::uint32_t>(drawn.points);
+    if (!all[i].allFinite()) continue;
+    append(all[i], drawn.numbers);
+    ++drawn.points;
+    if (kept) kept->rgb.insert(kept->rgb.end(), &colour->rgb[3 * i], &colour->rgb[3 * i] + 3);
   }
-  message.is_frame = true;
-  message.colour = header.colour;
-  message.payload = payload;
-  message.owner = std::move(owner);
-  return message;
+  for (const auto& [a, b, c] : surface->triangles) {
+    if (!all[a].allFinite() || !all[b].allFinite() || !all[c].allFinite()) continue;
+    append(std::array{place[a], place[b], place[c]}, drawn.numbers);
+    ++drawn.faces;
+  }
+  if (kept) {
+    kept->width = static_cast<int>(drawn.points);
+    kept->height = 1;
+    drawn.colour = std::move(kept);
+  }
+  return drawn;
 }
 
 // The float arrays' bytes, owned by the message.
@@ -125,27 +147,43 @@ ViewerMessage numbers_message(Kind kind, std::uint8_t camera, std::vector<float>
 
 }  // namespace
 
-ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
-                            std::shared_ptr<const void> owner) {
-  if (depth.size() != std::size_t{header.width} * header.height)
-    throw Error("depth image for the viewer", "its size is not width x height");
-  return frame_message(header, header.has_rays ? Format::depth_with_rays : Format::depth,
-                       std::as_bytes(depth), std::move(owner));
-}
-
-ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
-                             std::span<const std::uint32_t> triangles) {
-  const std::size_t count = std::size_t{header.width} * header.height;
-  if (xyz.size() != 3 * count)
-    throw Error("points for the viewer", "there are not three numbers for each");
-  if (triangles.size() % 3 != 0 ||
-      std::any_of(triangles.begin(), triangles.end(), [&](auto corner) { return corner >= count; }))
-    throw Error("triangles for the viewer", "they are not of the points");
-  // Behind the points, in the same payload.
-  for (const std::uint32_t corner : triangles) xyz.push_back(std::bit_cast<float>(corner));
-  auto [bytes, owner] = shared_bytes(std::move(xyz));
-  return frame_message(header, Format::points, bytes, std::move(owner),
-                       static_cast<std::uint32_t>(triangles.size() / 3));
+ViewerMessage frame_message(std::uint8_t camera, std::uint32_t number, const Frame& frame) {
+  ViewerMessage message{.is_frame = true, .owner = frame.cloud, .colour = frame.colour};
+  Format format = Format::points;
+  Intrinsics lens{.height = 1, .fx = 1.0, .fy = 1.0};
+  double metres_per_unit = 1.0;
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  std::uint32_t faces = 0;
+  if (const DepthImage* image = frame.cloud->image()) {
+    lens = image->intrinsics();
+    format = lens.distorted() ? Format::depth_with_rays : Format::depth;
+    metres_per_unit = 1.0 / image->units_per_metre();
+    world_from_camera = image->world_from_camera();
+    message.payload = std::as_bytes(std::span(image->depth()));
+  } else {
+    DrawnPoints drawn = drawn_points(*frame.cloud->point_cloud(), frame.colour.get());
+    lens.width = static_cast<int>(drawn.points);
+    faces = drawn.faces;
+    message.colour = std::move(drawn.colour);
+    std::tie(message.payload, message.owner) = shared_bytes(std::move(drawn.numbers));
+  }
+  const ColourImage* colour = message.colour.get();
+  const Colours colours = colour == nullptr ? Colours::none
+                          : colour->camera  ? Colours::own_camera
+                                            : Colours::registered;
+  if (colour != nullptr && (colour->rgb.size() != 3 * pixels_of(colour->width, colour->height) ||
+                            (!colour->camera && pixels_of(colour->width, colour->height) !=
+                                                    pixels_of(lens.width, lens.height))))
+    throw Error("colour for the viewer", "its size is not that of its image");
+  Writer writer(message.head);
+  writer.put(Kind::frame).put(camera).put(format).put(colours).put(number).put(frame.stamp);
+  writer.put(lens.width).put(lens.height).put_lens(lens).put_float(metres_per_unit);
+  writer.put_pose(world_from_camera).put(faces);
+  if (colours == Colours::own_camera) {
+    writer.put(colour->width).put(colour->height).put_lens(colour->camera->intrinsics);
+    writer.put_pose(colour->camera->world_from_camera.inverse());
+  }
+  return message;
 }
 
 ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
@@ -157,24 +195,27 @@ ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
 ViewerMessage tool_message(const ToolShape* tool) {
   const Triangles surface = tool == nullptr ? Triangles() : tool->surface();
   std::vector<float> values;
-  for (const Vec3& point : surface.points)
-    for (int axis = 0; axis < 3; ++axis) values.push_back(static_cast<float>(point[axis]));
-  for (const auto& corners : surface.triangles)
-    for (const std::uint32_t corner : corners) values.push_back(std::bit_cast<float>(corner));
+  for (const Vec3& point : surface.points) append(point, values);
+  for (const auto& triangle : surface.triangles) append(triangle, values);
   return numbers_message(Kind::tool, 0, std::move(values), surface.points.size(),
                          surface.triangles.size());
 }
 
-ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
-                           std::vector<float> rays) {
-  if (rays.size() != 2 * std::size_t{width} * height)
-    throw Error("rays for the viewer", "there are not two numbers for each pixel");
-  return numbers_message(Kind::rays, camera, std::move(rays), width, height);
+ViewerMessage rays_message(std::uint8_t camera, const ViewingRays& rays) {
+  const Intrinsics& lens = rays.intrinsics();
+  std::vector<float> xy;
+  xy.reserve(2 * pixels_of(lens.width, lens.height));
+  for (int v = 0; v < lens.height; ++v) {
+    for (int u = 0; u < lens.width; ++u) {
+      for (const double number : rays.ray(u, v)) xy.push_back(static_cast<float>(number));
+    }
+  }
+  return numbers_message(Kind::rays, camera, std::move(xy), lens.width, lens.height);
 }
 
 ViewerMessage ticks_message(const TickBatch& batch) {
   const std::size_t count = std::min(batch.samples.size(), TickBatch::max_samples);
-  const ServoTick& record = batch.tick;
+  const ServoTick& record = batch.newest;
   const Tick& tick = record.tick;
   const auto contacts = std::span(tick.contacts).first(tick.contact_count);
   ViewerMessage message;
@@ -297,9 +338,7 @@ std::optional<Command> parse_command(std::string_view message) {
 
 void TickBatcher::add(const ServoTick& record, double contact_radius) {
   const Tick& tick = record.tick;
-  batch_.tick = record;
-  batch_.flags |= tick.flags;
-  batch_.safety |= record.safety;
+  batch_.add(record);
   any_ = true;
 
   // How far the HIP is below the surface, which is one contact radius below the proxy.

@@ -28,42 +28,21 @@ namespace palpate {
 struct ViewerMessage {
   bool text = false;
   bool is_frame = false;  ///< the camera's next one takes its place
-  std::vector<std::byte> head;
-  std::span<const std::byte> payload;
-  std::shared_ptr<const void> owner;          ///< keeps the payload alive
-  std::shared_ptr<const ColourImage> colour;  ///< behind the payload; null: nothing is
+  std::vector<std::byte> head = {};
+  std::span<const std::byte> payload = {};
+  std::shared_ptr<const void> owner = {};          ///< keeps the payload alive
+  std::shared_ptr<const ColourImage> colour = {};  ///< behind the payload; null: nothing is
 };
 
-/// What a page needs to know of a frame besides its depths or points.
-struct FrameHeader {
-  std::uint8_t camera = 0;
-  std::uint32_t number = 0;               ///< of this camera's frames, from 0
-  double stamp = 0.0;                     ///< [s]
-  std::uint32_t width = 0;                ///< [px]; how many, of points
-  std::uint32_t height = 1;               ///< [px]
-  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< [px]
-  double metres_per_unit = 1.0;
-  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
-  bool has_rays = false;  ///< the lens is distorted: a rays message tells where pixels look
-  std::shared_ptr<const ColourImage> colour = {};  ///< null: none
-};
-
-/// A depth image as it was captured; holes are 0 and 65535.
-/// @param owner  keeps `depth` alive and unchanged
-/// @throws Error if the size is not width * height, or that of the colour is another.
-ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
-                            std::shared_ptr<const void> owner);
-
-/// Points without an image [m, camera], x y z after one another.
-/// @param triangles  of a mesh whose corners they are, three indices each; empty: none
-/// @throws Error if there are not three numbers for each, an index is beyond the points, or the
-///         colours are not one for each.
-ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
-                             std::span<const std::uint32_t> triangles = {});
+/// A camera's frame: its depth image as it was captured, with holes of 0 and 65535, not copied; or
+/// its points, which are, those that are finite, with the faces of a mesh.
+/// @param frame   of a DepthImage or a PointCloud
+/// @param number  of this camera's frames, from 0
+/// @throws Error if the size of the colour is not that of its image.
+ViewerMessage frame_message(std::uint8_t camera, std::uint32_t number, const Frame& frame);
 
 /// Where a distorted lens's pixels look: x and y of the ray (x, y, 1), NaN for none.
-ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
-                           std::vector<float> rays);
+ViewerMessage rays_message(std::uint8_t camera, const ViewingRays& rays);
 
 /// The path of the hand that was recorded with a camera's frames: t [s from the recording's first
 /// frame], x, y, z [m, world] after one another.
@@ -84,11 +63,9 @@ struct TickSample {
 };
 
 /// The newest tick, and what happened since the message before.
-struct TickBatch {
-  ServoTick tick = {};
-  std::uint32_t flags = 0;          ///< TickFlag bits of any tick
-  std::uint32_t safety = 0;         ///< SafetyFlag bits of any tick
-  std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
+struct TickBatch : TickReport {
+  std::vector<TickSample> samples =
+      {};  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };
 ViewerMessage ticks_message(const TickBatch& batch);

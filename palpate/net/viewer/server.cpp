@@ -323,7 +323,6 @@ class ViewerServer::Impl final : public Hub {
   }
   [[nodiscard]] std::string operator_url() const { return link(operator_token_); }
   [[nodiscard]] std::string opening_url() const { return link(opening_token_); }
-  [[nodiscard]] std::size_t viewers() const { return viewers_.load(); }
 
   // What was shown of a camera last, by its kind: the frame comes last, as it needs the others.
   using Camera = std::map<std::byte, SharedMessage, std::greater<>>;
@@ -378,7 +377,6 @@ class ViewerServer::Impl final : public Hub {
 
   void joined(const std::shared_ptr<PageSession>& page) override {
     pages_.push_back(page);
-    viewers_ = pages_.size();
     json hello = host_.hello();
     hello["role"] = to_string(role_of(*page));
     if (page->admission().needs_token) hello["operator_token"] = operator_token_;
@@ -394,7 +392,6 @@ class ViewerServer::Impl final : public Hub {
     const bool had_hand = hand_owner_ == &page;
     if (had_hand) release_hand();
     std::erase_if(pages_, [&](const auto& other) { return other.get() == &page; });
-    viewers_ = pages_.size();
     tell_presence(had_hand);
   }
 
@@ -590,7 +587,6 @@ class ViewerServer::Impl final : public Hub {
   bool beyond_loopback_ = false;
   std::string url_;
   std::uint16_t port_ = 0;
-  std::atomic<std::size_t> viewers_{0};
   // These outlive the context, and so all sessions.
   std::vector<HttpSession*> connections_;  // without pages, oldest first
   int viewer_pages_ = 0, operator_pages_ = 0;
@@ -849,7 +845,6 @@ std::uint16_t ViewerServer::port() const { return impl_->port(); }
 std::string ViewerServer::url(const std::string& host) const { return impl_->url(host); }
 std::string ViewerServer::operator_url() const { return impl_->operator_url(); }
 std::string ViewerServer::opening_url() const { return impl_->opening_url(); }
-std::size_t ViewerServer::viewers() const { return impl_->viewers(); }
 void ViewerServer::show(std::uint8_t camera, ViewerMessage message) {
   impl_->show(camera, std::move(message));
 }

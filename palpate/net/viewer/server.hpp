@@ -84,8 +84,6 @@ class ViewerServer {
   [[nodiscard]] std::string operator_url() const;
   /// The operator's page, once and within a minute: for a command line, which others may see.
   [[nodiscard]] std::string opening_url() const;
-  /// How many pages are connected. Any thread.
-  [[nodiscard]] std::size_t viewers() const;
 
   /// For all pages from now on, until another of its kind comes: a camera's newest frame (pages see
   /// the newest, not each), the rays of its pixels (before its first frame if its lens is

@@ -16,6 +16,7 @@
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/servo/placement.hpp"
@@ -41,7 +42,7 @@ static void to_json(json& shown, const MethodInfo& method) {
   shown = {{"name", method.name}, {"meaning", method.summary}};
 }
 
-static void to_json(json& shown, const TickFlagInfo& flag) {
+static void to_json(json& shown, const FlagInfo& flag) {
   shown = {{"name", flag.name}, {"meaning", flag.meaning}};
 }
 
@@ -202,10 +203,6 @@ void SessionHost::show_on(ViewerServer* server) {
 json SessionHost::hello() {
   json safety = safety_parameter_table();
   for (json& row : safety) row["stricter"] = stricter_text(row["name"].get<std::string>());
-  json safety_flags = json::array();
-  for (std::size_t i = 0; i < safety_flag_count; ++i)
-    safety_flags.push_back(
-        {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
   json choices = tools;
   if (first_tool_ &&
       std::find(choices.begin(), choices.end(), first_tool_->text()) == choices.end())
@@ -222,7 +219,7 @@ json SessionHost::hello() {
           {"safety", safety},
           {"placement", placement_table()},
           {"flags", tick_flag_table()},
-          {"safety_flags", safety_flags}};
+          {"safety_flags", safety_flag_table()}};
 }
 
 void SessionHost::forbid(const Forbid& wanted) {
@@ -349,10 +346,6 @@ json SessionHost::state() {
               {"spacing", proposed_->spacing},
               {"scale", proposed_->scale},
               {"rescaled", rescaled_uri_}};
-  json latched_by = json::array();
-  for (std::size_t i = 0; i < safety_flag_count; ++i) {
-    if ((first.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
-  }
   json fixtures = json::array();
   if (state.settings.fixtures) fixtures = state.settings.fixtures->items();
   json brush;
@@ -373,11 +366,11 @@ json SessionHost::state() {
            {{"uri", device.uri},
             {"kind", device.kind},
             {"takes_hand", mouse_ != nullptr},
-            {"fault", first.device.text},
+            {"fault", first.trouble},
             {"warnings", warnings}}},
           {"servo", servo_json(*session_, state)},
           {"interventions", first.interventions},
-          {"latched_by", latched_by},
+          {"latched_by", names_of(flags_in(first.latched_by, safety_flag_table()))},
           {"on_hold", state.held},
           {"flag_ticks", first.summary.flag_ticks},
           {"pop_throughs", first.summary.pop_throughs},
@@ -549,8 +542,7 @@ void SessionHost::command(const Command& command, Role role) {
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);
   } else if (const auto* brush = std::get_if<SetBrush>(&command)) {
-    if (!(brush->radius >= Paint::smallest && brush->radius <= Paint::largest))
-      throw Error("brush", "its radius is out of range", "give 0.001 to 0.1 m");
+    check_range("brush", "radius", "m", Paint::smallest, Paint::largest, brush->radius);
     const std::vector<std::string> names = paintable();
     if (!brush->material.empty() &&
         std::find(names.begin(), names.end(), brush->material) == names.end())
@@ -603,76 +595,11 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
   const auto camera = static_cast<std::uint8_t>(number);
   // A still image came first before there was a server: what is shown again then is new to it.
   if (server == nullptr || (!fed.is_new && numbers_[camera] > 0)) return;
-  const Frame& frame = fed.frame;
-  FrameHeader header;
-  header.camera = camera;
-  header.number = numbers_[camera]++;
-  header.stamp = frame.stamp;
-  if (const auto* image = frame.cloud->image()) {
-    const Intrinsics& k = image->intrinsics();
-    header.width = static_cast<std::uint32_t>(k.width);
-    header.height = static_cast<std::uint32_t>(k.height);
-    header.fx = k.fx;
-    header.fy = k.fy;
-    header.cx = k.cx;
-    header.cy = k.cy;
-    header.metres_per_unit = 1.0 / image->units_per_metre();
-    header.world_from_camera = image->world_from_camera();
-    header.has_rays = k.distorted();
-    if (header.has_rays && header.number == 0) show_rays(camera, image->rays());
-    header.colour = frame.colour;
-    server->show(camera, depth_message(header, image->depth(), frame.cloud));
-  } else if (const auto* points = frame.cloud->point_cloud()) {
-    std::vector<float> xyz;
-    std::vector<std::uint32_t> triangles;
-    const auto put = [&](const Vec3& point) {
-      for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(point[axis]));
-    };
-    if (const Surface* given = points->surface()) {
-      const std::vector<Vec3>& all = given->points;
-      const bool has_colour = frame.colour && frame.colour->rgb.size() == 3 * all.size();
-      auto colour = has_colour ? std::make_shared<ColourImage>() : nullptr;
-      std::vector<std::uint32_t> place(all.size(), 0);  // among those that are finite
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        place[i] = static_cast<std::uint32_t>(xyz.size() / 3);
-        if (!all[i].allFinite()) continue;
-        put(all[i]);
-        if (!colour) continue;
-        for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) colour->rgb.push_back(frame.colour->rgb[k]);
-      }
-      for (const auto& corners : given->triangles) {
-        if (!std::all_of(corners.begin(), corners.end(),
-                         [&](std::uint32_t i) { return all[i].allFinite(); }))
-          continue;
-        for (const std::uint32_t i : corners) triangles.push_back(place[i]);
-      }
-      if (colour) {
-        colour->width = static_cast<int>(xyz.size() / 3);
-        colour->height = 1;
-        header.colour = std::move(colour);
-      }
-    } else {
-      xyz.reserve(3 * points->size());
-      for (std::size_t i = 0; i < points->size(); ++i) put(points->point(i));
-    }
-    header.width = static_cast<std::uint32_t>(xyz.size() / 3);
-    server->show(camera, points_message(header, std::move(xyz), triangles));
-  }
-}
-
-void SessionHost::show_rays(std::uint8_t camera, const ViewingRays& rays) {
-  const Intrinsics& k = rays.intrinsics();
-  std::vector<float> xy;
-  xy.reserve(2 * static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
-  for (int v = 0; v < k.height; ++v) {
-    for (int u = 0; u < k.width; ++u) {
-      const Eigen::Vector2d ray = rays.ray(u, v);
-      xy.push_back(static_cast<float>(ray.x()));
-      xy.push_back(static_cast<float>(ray.y()));
-    }
-  }
-  server_.load()->show(camera, rays_message(camera, static_cast<std::uint32_t>(k.width),
-                                            static_cast<std::uint32_t>(k.height), std::move(xy)));
+  const DepthImage* image = fed.frame.cloud->image();
+  if (image == nullptr && fed.frame.cloud->point_cloud() == nullptr) return;
+  if (image != nullptr && image->intrinsics().distorted() && numbers_[camera] == 0)
+    server->show(camera, rays_message(camera, image->rays()));
+  server->show(camera, frame_message(camera, numbers_[camera]++, fed.frame));
 }
 
 DroppedFiles::~DroppedFiles() {

@@ -143,7 +143,6 @@ class SessionHost final : public ViewerHost {
   void look_at_points(const std::string& uri);
   void rescale(double times);
   void paint(const ServoTick& record, double contact_radius);
-  void show_rays(std::uint8_t camera, const ViewingRays& rays);
 
   std::string version_;
   PageRules rules_;

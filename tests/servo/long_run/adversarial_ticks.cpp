@@ -25,16 +25,15 @@ int main(int argc, char** argv) {
   for (const Adversary& hand : hands) {
     const auto& statistics = hand.statistics();
     std::printf(
-        "%llu ticks, %llu with force, %llu with torque, %llu of a tool, %llu in contact, strongest "
-        "%.3f N and %.4f N m\n",
+        "%llu ticks, %llu with force, %llu with torque, %llu of a tool, strongest %.3f N "
+        "and %.4f N m\n",
         static_cast<unsigned long long>(hand.ticks()),
         static_cast<unsigned long long>(hand.forceful_ticks()),
         static_cast<unsigned long long>(hand.turning_ticks()),
-        static_cast<unsigned long long>(hand.tool_ticks()),
-        static_cast<unsigned long long>(statistics.contact_ticks.load()), hand.strongest(),
+        static_cast<unsigned long long>(hand.tool_ticks()), hand.strongest(),
         hand.strongest_torque());
     for (std::size_t i = 0; i < palpate::safety_flag_count; ++i)
-      std::printf("%-16s %llu\n", palpate::safety_flag_names()[i].data(),
+      std::printf("%-16s %llu\n", palpate::safety_flag_table()[i].name.data(),
                   static_cast<unsigned long long>(statistics.interventions[i].load()));
   }
   return 0;

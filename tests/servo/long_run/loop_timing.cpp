@@ -81,10 +81,8 @@ void run(double seconds, double rate) {
   print("null", null_loop.realtime(), null_loop.timing());
   const CycleStatistics& did = loop.statistics();
   std::printf(
-      "in contact %llu, steps %llu, strongest %.2f N; frames adopted %llu, dropped %llu; "
+      "frames adopted %llu, dropped %llu; "
       "frame to tick [us]: p50 %.0f  p99 %.0f  max %.0f\n",
-      static_cast<unsigned long long>(did.contact_ticks.load()),
-      static_cast<unsigned long long>(did.steps.load()), did.max_force.load(),
       static_cast<unsigned long long>(did.frames_adopted.load()),
       static_cast<unsigned long long>(did.frames_dropped.load()),
       1e-3 * static_cast<double>(did.hand_over.quantile(0.5)),

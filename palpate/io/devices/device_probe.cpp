@@ -228,7 +228,7 @@ class Stalls {
   // Did one end or forbid what ended at t? The force would have been back.
   [[nodiscard]] bool explain(double t) const { return count_ > 0 && t - last_ < memory; }
   [[nodiscard]] std::string text() const {
-    return worst_.text + rounded(1e3 * worst_.length, 0) + " ms";
+    return worst_.text + fixed_text(1e3 * worst_.length, 0) + " ms";
   }
 
  private:
@@ -484,7 +484,7 @@ void doubt(DeviceMeasurement& result) {
   if (result.stalls > 0 && !result.doubts.empty())
     result.doubts.push_back(
         "the computer was too busy, which may be why: stalls: " + std::to_string(result.stalls) +
-        ", the longest of " + rounded(1e3 * result.longest_stall, 0) +
+        ", the longest of " + fixed_text(1e3 * result.longest_stall, 0) +
         " ms; end other programs and measure again");
 }
 

@@ -219,6 +219,18 @@ TEST(FusedImage, KeepsAPixelThatFlickersAndDropsOneThatIsGone) {
   EXPECT_EQ(points(), 0U);
 }
 
+TEST(FusedImage, BeginsAgainWhereAFrameShowsWhatIsFarBehind) {
+  Camera camera;
+  FusedImage fused;
+  for (int i = 0; i < 12; ++i) {
+    const double floor = i < 8 ? 0.0 : -0.3;
+    observe(fused, camera.shoot([=](double x, double y) { return valley(x, y) + floor; }), i,
+            Vec3(0, 0, 2e-3));
+    EXPECT_LT(fused.correction().norm(), 5e-3) << i;
+    EXPECT_LT(fused.displacement((i + 1) * interval).norm(), 5e-3) << i;
+  }
+}
+
 TEST(FusedImage, BeginsAgainWhenTheCameraMoves) {
   Camera first;
   Camera second(0.01);

@@ -200,6 +200,31 @@ TEST(Monitor, SeesAProxyBehindASlopeThatACoarseCameraSees) {
   EXPECT_NEAR(verdict.front.z(), 0.6 - r_c, 2e-3);
 }
 
+// A slope of 45 degrees leaves the image: what is still seen of it lies beside the proxy, and
+// nearer to the camera than the proxy is.
+TEST(Monitor, TakesNoSlopeThatIsSeenBesideTheProxyForASurfaceBeforeIt) {
+  const auto slope = [](double begins) {
+    std::vector<Vec3> points;
+    for (const Vec3& p : test::flat_grid(0.0, 1.5e-3, 60))
+      if (p.x() < begins) points.emplace_back(p.x(), p.y(), -p.x());
+    return PointCloud(points, eye);
+  };
+  Monitor monitor;
+  Monitor::Contact contact = pressed(-2e-3, 1.5 * r_c);
+  const PointCloud whole = slope(1.0);
+  for (int frame = 0; frame < 3; ++frame) {
+    monitor.start_frame();
+    EXPECT_FALSE(monitor.judge(whole, contact).behind);
+  }
+  for (const double begins : {-6e-3, -10e-3, -15e-3, -20e-3}) {
+    const PointCloud rest = slope(begins);
+    monitor.start_frame();
+    const Monitor::Verdict verdict = monitor.judge(rest, contact);
+    EXPECT_FALSE(verdict.behind) << begins;
+    EXPECT_EQ(verdict.action, Monitor::Action::none) << begins;
+  }
+}
+
 TEST(Monitor, TakesWhatComesFarBeforeTheContactForSomethingElse) {
   Monitor monitor;
   meet(monitor, 1.0);

@@ -495,6 +495,29 @@ TEST(Sight, HoldsTheContactWhenSomethingCoversAllThatIsSeenWithinAFrame) {
   }
 }
 
+// A box is put below a hovering hand and hides the table that was followed behind it. The hand
+// comes down on the box and stays.
+TEST(Sight, KeepsTheForceOfWhatHidTheSurfaceThatWasFollowedBeforeTheContact) {
+  constexpr double top = 0.015;  // [m]
+  const Overhead camera;
+  std::mt19937 random(3);
+  Sight sight = seated({0, 0, 0.025});
+  const auto hip = [](double t) {
+    return Vec3(0, 0, std::max(0.025 - 0.05 * std::max(t - 0.7, 0.0), top - 0.004));
+  };
+  for (int k = 0; k < 75; ++k) {
+    const DepthImage image = camera.shoot(
+        [&](double x, double y) {
+          return k >= 12 && std::max(std::abs(x), std::abs(y)) < 0.03 ? top : 0.0;
+        },
+        1e-3, random);
+    const Tick tick = live_through(sight, image, k * interval, hip);
+    if (k * interval > 1.1) {
+      EXPECT_NEAR(tick.force.z(), 2.4, 0.3) << "frame " << k;
+    }
+  }
+}
+
 // Before a slow camera a visitor is there in one frame, everywhere, and gone in another. The hand,
 // pressed in, moves on meanwhile: it must be neither numb afterwards nor held when it lifts.
 TEST(Sight, KnowsASlowCamerasVisitorFromTheSurface) {
@@ -940,20 +963,21 @@ class Ride {
  public:
   // [N] the rendered force of the next tick.
   double tick(double known, bool returned = false, const Vec3& force = Vec3(0, 0, 3.0)) {
+    return force_in(known, returned, force).norm();
+  }
+  Vec3 force_in(double known, bool returned, const Vec3& force) {
     t_ += 1e-3;
-    return renderer_
-        .render({.hip = Vec3(0, 0, 0.08 * t_),
-                 .t = t_,
-                 .force = force,
-                 .normal = Vec3(0, 0, 1),
-                 .velocity = Vec3(0, 0, 0.08),
-                 .blend = 0.03,
-                 .known = known,
-                 .returned = returned,
-                 .return_speed = 0.01,
-                 .r_c = r_c},
-                {})
-        .norm();
+    return renderer_.render({.hip = Vec3(0, 0, 0.08 * t_),
+                             .t = t_,
+                             .force = force,
+                             .normal = Vec3(0, 0, 1),
+                             .velocity = Vec3(0, 0, 0.08),
+                             .blend = 0.03,
+                             .known = known,
+                             .returned = returned,
+                             .return_speed = 0.01,
+                             .r_c = r_c},
+                            {});
   }
 
  private:
@@ -974,9 +998,50 @@ TEST(ForceRenderer, KeepsWhatWasFeltWhenTheProxyIsPutBackInFront) {
   ride.tick(1.0);
   EXPECT_NEAR(ride.tick(1.0, true, Vec3(0, 0, 5.0)), 3.0, 0.1);
   EXPECT_LT(ride.tick(1.0, false, Vec3(0, 0, 5.0)), 3.2);
-  Ride other;
-  other.tick(1.0);
-  EXPECT_EQ(other.tick(1.0, true, Vec3(0, 3.0, 0)), 0.0) << "another direction is new";
+}
+
+TEST(ForceRenderer, TurnsTheForceWhereTheProxyIsPutBackAsideWithoutAStep) {
+  Ride ride;
+  ride.tick(1.0);
+  const Vec3 aside(0, 3.0, 0);
+  Vec3 last = ride.force_in(1.0, true, aside);
+  EXPECT_LT((last - Vec3(0, 0, 3.0)).norm(), 0.1);
+  for (int i = 0; i < 29; ++i) {
+    const Vec3 now = ride.force_in(1.0, false, aside);
+    EXPECT_LT((now - last).norm(), 0.2) << i;
+    last = now;
+  }
+  EXPECT_LT(last.z(), 0.05);
+  EXPECT_NEAR(last.y(), 600.0 * 0.01 * 0.03, 0.03) << "another direction is new";
+}
+
+TEST(ForceRenderer, SpreadsWhatJumpsBetweenFramesButEndsAForceInATick) {
+  ForceRenderer renderer;
+  double t = 0.0;
+  const auto tick = [&](const Vec3& force) {
+    t += 1e-3;
+    return renderer.render({.hip = Vec3::Zero(),
+                            .t = t,
+                            .force = force,
+                            .normal = Vec3(0, 0, 1),
+                            .velocity = Vec3::Zero(),
+                            .blend = 0.03,
+                            .known = 1.0,
+                            .returned = false,
+                            .return_speed = 0.01,
+                            .r_c = r_c},
+                           {});
+  };
+  Vec3 last = tick(Vec3(0, 0, 3));
+  last = tick(Vec3(0, 0, 3));
+  for (int i = 0; i < 40; ++i) {
+    const Vec3 now = tick(Vec3(2, 0, 5));
+    EXPECT_LT((now - last).norm(), 0.16) << i;
+    last = now;
+  }
+  EXPECT_LT((last - Vec3(2, 0, 5)).norm(), 1e-9);
+  renderer.release();
+  EXPECT_EQ(tick(Vec3::Zero()), Vec3(0, 0, 0));
 }
 
 TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {

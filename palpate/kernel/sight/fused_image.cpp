@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "palpate/kernel/cloud/implied_points.hpp"
+#include "palpate/kernel/sight/monitor.hpp"
 #include "palpate/kernel/sight/relief.hpp"
 
 namespace palpate {
@@ -139,7 +140,11 @@ void FusedImage::observe(const DepthImage& image, const Look& look,
   const int v = nearest_pixel(k.cy, k.fy, ray.y());
   if (goes_on) move_to(u, v);
   const double pitch = image.spacing(look.place);
-  if (!goes_on || !(pitch > 0.0) || !find_level(u, v, look.radius / pitch)) restart(image, u, v);
+  const float before = newest_;
+  // A level that jumps farther than a surface moves is of another one.
+  if (!goes_on || !(pitch > 0.0) || !find_level(u, v, look.radius / pitch) ||
+      std::abs(double{newest_} - double{before}) > farthest_strike * parameters.detail)
+    restart(image, u, v);
   update();
   frames_ = std::min(frames_ + 1, most_frames);
   std::copy_backward(levels_.begin(), levels_.begin() + most_frames - 1,

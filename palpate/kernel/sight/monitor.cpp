@@ -44,6 +44,50 @@ constexpr double sideways = 0.4;        // [detail]
 constexpr double away = -0.3;
 // [detail] A look serves as long as its place moves less than this.
 constexpr double look_serves = 0.2;
+// [-] standard deviations: a slope that rises by less says nothing.
+constexpr double least_rise = 3.0;
+
+// [m] By how much more a slope rises towards the camera at a view's points, where these lie beside
+// the place, than at the place.
+// @param begin, end  of the view's points in the patch
+double rise_beside(const Patch& patch, std::size_t begin, std::size_t end,
+                   const Eigen::Vector3f& towards, float farthest) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  std::size_t size = 0;
+  const auto each = [&](const auto& use) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3f p(patch.x()[i], patch.y()[i], patch.z()[i]);
+      if (p.dot(towards) >= -farthest && p.allFinite()) use(p.cast<double>());
+    }
+  };
+  each([&](const Vec3& p) {
+    mean += p;
+    ++size;
+  });
+  if (size == 0) return 0.0;
+  mean /= static_cast<double>(size);
+  const Vec3 line = towards.cast<double>();
+  const double height = mean.dot(line);
+  const Vec3 beside = mean - height * line;
+  const double aside = beside.norm();
+  if (!(aside > 0.0)) return 0.0;
+  double squares = 0.0;
+  double products = 0.0;
+  double heights = 0.0;
+  each([&](const Vec3& p) {
+    const double along = p.dot(beside) / aside - aside;
+    const double above = p.dot(line) - height;
+    squares += along * along;
+    products += along * above;
+    heights += above * above;
+  });
+  if (!(squares > 0.0)) return 0.0;
+  const double rise = aside * products / squares;
+  const double residual = std::max(heights - products * products / squares, 0.0);
+  const double variance = residual / static_cast<double>(size) *
+                          (1.0 / static_cast<double>(size) + aside * aside / squares);
+  return rise * rise > least_rise * least_rise * variance ? rise : 0.0;
+}
 
 }  // namespace
 
@@ -68,11 +112,13 @@ void Monitor::forget() noexcept {
 
 // What each camera measures on its lines of sight within `radius` of `place`. A camera that sees
 // the place free, or in front of a surface, is right whatever others see.
-void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& result) noexcept {
+void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, bool widened,
+                   Look& result) noexcept {
   result = {};
   result.fresh = true;
   result.place = place;
   result.radius = radius;
+  result.widened = widened;
   gather(cloud, Beam{place, radius, hides_reach * parameters_.detail, Vec3::UnitZ()}, look_points,
          patch_);
   std::array<float, look_points> heights;
@@ -93,13 +139,16 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
     const std::span<const float> all(heights.data(), size);
     const auto strayed = static_cast<std::size_t>(strays * static_cast<double>(size));
     const double clear = -kth_smallest(all, size - 1 - strayed);
-    const double behind = kth_smallest(all, size / 2);
+    // A widened footprint may hold points on one side alone: of a slope these are nearer or
+    // farther.
+    const double rise = widened ? rise_beside(patch_, view.begin, end, towards, farthest) : 0.0;
+    const double behind = kth_smallest(all, size / 2) - rise;
     if (!result.seen || behind < result.behind) {
       result.behind = behind;
       result.line = line;
       result.distance = (*view.viewpoint - place).norm();
-      result.low = kth_smallest(all, size / 10);
-      result.high = kth_smallest(all, size - 1 - size / 10);
+      result.low = kth_smallest(all, size / 10) - rise;
+      result.high = kth_smallest(all, size - 1 - size / 10) - rise;
     }
     result.clear = result.seen ? std::max(result.clear, clear) : clear;
     result.seen = true;
@@ -112,7 +161,7 @@ const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, dou
   if (last.fresh && (place - last.place).norm() < look_serves * parameters_.detail) return last;
   radius = std::max(radius, narrowest * cloud.spacing(place));
   for (int i = 0; i < 3; ++i, radius *= widening) {
-    look(cloud, place, radius, last);
+    look(cloud, place, radius, i > 0, last);
     if (last.seen) break;
   }
   return last;
@@ -121,7 +170,7 @@ const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, dou
 // Does the newest frame show the surface where the proxy was last in front of it?
 bool Monitor::still_shown(const Cloud& cloud, double margin) noexcept {
   Look there;
-  look(cloud, last_front_.place, last_front_.radius, there);
+  look(cloud, last_front_.place, last_front_.radius, last_front_.widened, there);
   return there.seen && std::abs(there.behind - last_front_.behind) <= margin;
 }
 

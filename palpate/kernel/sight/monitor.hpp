@@ -75,6 +75,7 @@ class Monitor {
     bool seen = false;             // by any camera
     Vec3 place = Vec3::Zero();     // [m] world
     double radius = 0.0;           // [m] of the footprint there
+    bool widened = false;          // it is wider than asked for: a narrower one says nothing
     double clear = 0.0;            // [m] by which all that is measured lies behind the place
     double behind = 0.0;           // [m] by which the place lies behind the median, negative before
     Vec3 line = Vec3::UnitZ();     // [-] from the place to the camera of `behind`
@@ -83,7 +84,8 @@ class Monitor {
   };
 
   const Look& look_at(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
-  void look(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
+  void look(const Cloud& cloud, const Vec3& place, double radius, bool widened,
+            Look& look) noexcept;
   bool is_behind(const Cloud& cloud, double margin, double deepest) noexcept;
   [[nodiscard]] double most_margin(double distance) const noexcept;
   bool still_shown(const Cloud& cloud, double margin) noexcept;

@@ -16,9 +16,9 @@ inline double ease(double x) noexcept {
   return 1.0 - x * x * (3.0 - 2.0 * x);
 }
 
-/// The force that a hand feels, from what the coupling says: spreads what frames correct, takes
-/// what is left of an old force from a hand that leaves, and lets a force fade and come back with
-/// the knowledge of the surface. docs/sight.md, 6.
+/// The force that a hand feels, from what the coupling says: lets it fade and come back with the
+/// knowledge of the surface, spreads what frames correct and what jumps between them, and takes
+/// what is left of an old force from a hand that leaves. docs/sight.md, 6.
 ///
 /// [servo] Nothing here allocates, locks or throws.
 class ForceRenderer {
@@ -31,7 +31,7 @@ class ForceRenderer {
     Vec3 velocity;               ///< [m/s] world: of that surface, as it is rendered
     double blend;                ///< [s] over which a correction is spread
     double known;                ///< [-] 0 to 1: how well the surface is known
-    bool returned;               ///< the proxy was put back in front: nothing more is felt at once
+    bool returned;               ///< the proxy was put back in front: no more is felt at once
     double return_speed;         ///< [m/s] at which it comes back once it is known again
     double r_c;                  ///< [m] and so much beyond itself
   };
@@ -46,15 +46,16 @@ class ForceRenderer {
   void release() noexcept {
     due_.reset();
     offset_ = Vec3::Zero();
+    ends_ = true;
   }
   void forget() noexcept {
     release();
-    force_ = rendered_ = Vec3::Zero();
+    force_ = coupled_ = Vec3::Zero();
     felt_ = fully;
   }
   Vec3 render(const Input& input, const Coupling& coupling) noexcept;
 
-  /// [N] world: of the last tick, before it faded.
+  /// [N] world: of the last tick.
   [[nodiscard]] const Vec3& last() const noexcept { return force_; }
   /// [m] world: the last hand.
   [[nodiscard]] const Vec3& hip() const noexcept { return hip_; }
@@ -62,15 +63,17 @@ class ForceRenderer {
  private:
   static constexpr double fully = std::numeric_limits<double>::infinity();
 
-  [[nodiscard]] Vec3 blend(const Input& input, const Coupling& coupling) noexcept;
+  [[nodiscard]] bool jumps(const Input& input, const Vec3& moved, double stiffness) const noexcept;
+  [[nodiscard]] Vec3 blend(const Input& input, const Vec3& target, double stiffness) noexcept;
   [[nodiscard]] Vec3 left_behind(Vec3 force, const Input& input, double stiffness) noexcept;
-  [[nodiscard]] Vec3 come_back(Vec3 force, const Input& input, double stiffness) noexcept;
+  [[nodiscard]] Vec3 come_back(const Input& input, double stiffness) noexcept;
 
   std::optional<Vec3> due_;         // [m/s] a correction came since the last force
+  bool ends_ = true;                // the force may be another in the next tick
   Vec3 offset_ = Vec3::Zero();      // [N] that it leaves to blend out
   double start_ = 0.0;              // [s] of that
-  Vec3 force_ = Vec3::Zero();       // [N] the last one, before it faded
-  Vec3 rendered_ = Vec3::Zero();    // [N] and after
+  Vec3 coupled_ = Vec3::Zero();     // [N] what the coupling said last
+  Vec3 force_ = Vec3::Zero();       // [N] the last one
   Vec3 hip_ = Vec3::Zero();         // [m] then
   double t_ = 0.0;                  // [s] then
   Vec3 left_at_ = Vec3::Zero();     // [m] the hand in the last tick in which it pressed

@@ -263,17 +263,22 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
   return movement;
 }
 
-// Puts the proxy at the hand, without a force.
-void Sight::release(const Vec3& hip, Movement& movement) noexcept {
+// Puts the proxy at a place, where it touches nothing.
+void Sight::put(const Vec3& place, Movement& movement) noexcept {
   contact_.tracker.note(Evidence::lost);
   contact_.tracker.note(Evidence::left);
   contact_.mover.invalidate();
   contact_.proxy = {};
-  contact_.proxy.at = hip;
+  contact_.proxy.at = place;
   contact_.points_moved = Vec3::Zero();
-  contact_.renderer.release();
   movement.state = ContactState::free_motion;
   movement.normal = Vec3::Zero();
+}
+
+// Puts the proxy at the hand, without a force.
+void Sight::release(const Vec3& hip, Movement& movement) noexcept {
+  put(hip, movement);
+  contact_.renderer.release();
 }
 
 // What the newest frame itself shows overrules every estimate: docs/sight.md, 7. Was the proxy put
@@ -315,7 +320,7 @@ bool Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
       movement.flags |= proxy_let_go;
       break;
     case Monitor::Action::return_to_front:
-      release(verdict.front, movement);
+      put(verdict.front, movement);
       tracker.watch(*frame_.cloud(), verdict.front);
       tracker.note(Evidence::on_points);
       proxy.touching = true;

@@ -58,6 +58,7 @@ class Sight final : public Method {
   bool rest_on_fit(const Vec3& hip, double t, Movement& movement) noexcept;
   void move_over_points(const Vec3& hip, double t, Movement& movement) noexcept;
   bool supervise(const Vec3& hip, double t, Movement& movement) noexcept;
+  void put(const Vec3& place, Movement& movement) noexcept;
   void release(const Vec3& hip, Movement& movement) noexcept;
   void repair_side(const Vec3& points_moved) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;

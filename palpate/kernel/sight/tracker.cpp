@@ -376,9 +376,23 @@ void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexce
   start(clouds, camera, place, line);
 }
 
+// Does the camera that sees most there show a surface at `foot`, from the side of `normal`?
+bool SightTracker::is_shown(const ObservedClouds& clouds, const Vec3& foot,
+                            const Vec3& normal) noexcept {
+  const Cloud& cloud = *clouds.of(best_camera(clouds, foot));
+  const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
+  return seen && seen->line.dot(normal) > 0.0 &&
+         std::abs(seen->above) < SurfaceEstimate::narrowest_gate * surface_.detail();
+}
+
 void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
                          const Vec3& normal) noexcept {
-  if (holding()) return;
+  // What hid the surface and is touched from in front, where the newest frame shows it, is followed
+  // instead.
+  if (holding()) {
+    if (!is_shown(clouds, foot, normal)) return;
+    note(Evidence::lost);
+  }
   if (tracking()) {
     const Vec3 local = surface_.frame().local_from_world(foot);
     const Vec2 at = local.head<2>();

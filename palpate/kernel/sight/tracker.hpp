@@ -156,6 +156,8 @@ class SightTracker {
   };
   [[nodiscard]] std::optional<Seen> look_at(const Cloud& cloud, const Vec3& place,
                                             double radius) noexcept;
+  [[nodiscard]] bool is_shown(const ObservedClouds& clouds, const Vec3& foot,
+                              const Vec3& normal) noexcept;
   [[nodiscard]] Ring look_beside(const Cloud& cloud, const Vec3& place) noexcept;
   [[nodiscard]] bool is_occluder(const Ring& before, const Ring& now, double height, double jump,
                                  double hardest_strike) const noexcept;

@@ -255,7 +255,8 @@ Outcome judged(const std::string& name, const ExperimentOptions& options, Action
   play(*method, scenario, [&](const Tick& tick) {
     const auto [now, normal] = truth(tick.proxy, tick.t);
     behind = now < 0.0 && truth(tick.proxy, shown).distance < 0.0 ? behind + 1 : 0;
-    const bool inside = is_followed(action) && truth(tick.hip, tick.t).distance < 0.0;
+    // Half of r_c: about what a plane and a surface differ by before a Kinect.
+    const bool inside = is_followed(action) && truth(tick.hip, tick.t).distance < -0.5 * r_c;
     numb = inside && tick.force.isZero() ? numb + 1 : 0;
     if (behind > patience * scenario.tick_rate || numb > frame) outcome.lost = true;
     // The audit knows nothing of the plane; an occluder before the contact means nothing.

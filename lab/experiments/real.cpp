@@ -258,7 +258,7 @@ Outcome judged(const std::string& name, const ExperimentOptions& options, Action
     // Half of r_c: about what a plane and a surface differ by before a Kinect.
     const bool inside = is_followed(action) && truth(tick.hip, tick.t).distance < -0.5 * r_c;
     numb = inside && tick.force.isZero() ? numb + 1 : 0;
-    if (behind > patience * scenario.tick_rate || numb > frame) outcome.lost = true;
+    if (behind > patience * scenario.tick_rate || numb > 3.0 * frame) outcome.lost = true;
     // The audit knows nothing of the plane; an occluder before the contact means nothing.
     const auto seen =
         action == Action::sweep ? std::nullopt : distance_behind(*cloud->image(), tick.proxy, r_c);

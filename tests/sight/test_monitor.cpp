@@ -120,6 +120,16 @@ TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
   EXPECT_NEAR(verdict.normal.z(), 1.0, 1e-6);
 }
 
+TEST(Monitor, TakesNoMoreForNoiseThanTheNewestFrameScatters) {
+  // Before a camera that shakes the estimate of the noise is too large.
+  const PointCloud plane = plane_at(0.0);
+  Monitor monitor;
+  meet(monitor, 1.0);
+  Monitor::Contact inside = pressed(-0.012, -0.006);
+  inside.noise = 5e-3;
+  EXPECT_TRUE(monitor.judge(plane, inside).behind);
+}
+
 TEST(Monitor, BringsBackAtOnceAProxyThatPassesThroughAgain) {
   Monitor monitor;
   meet(monitor, 1.0);

@@ -40,6 +40,9 @@ constexpr double one_layer = 4.0;
 constexpr double edge_step = 2.0;
 constexpr double steepest_rise = 2.75;  // [-] tan 70 degrees
 constexpr double sideways = 0.4;        // [detail]
+// [-] Noise that moves a footprint also spreads its points: the margin for it is at most this, in
+// multiples of what 80 % of them span: four standard deviations.
+constexpr double most_spans = 1.5;
 // [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
 constexpr double away = -0.3;
 // [detail] A look serves as long as its place moves less than this.
@@ -217,13 +220,14 @@ bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest) noexc
 Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noexcept {
   Verdict verdict;
   const double r_c = r_c_;
-  const auto margin_at = [&](double distance) {
+  const auto margin_of = [&](const Look& look) {
+    const double most = std::min(most_margin(look.distance), most_spans * (look.high - look.low));
     return std::max(least_margin * parameters_.detail,
-                    std::min(parameters_.confidence * contact.noise, most_margin(distance)));
+                    std::min(parameters_.confidence * contact.noise, most));
   };
   // The frame shows the surface where it was when the frame was captured.
   const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);
-  const double margin = margin_at(proxy.distance);
+  const double margin = margin_of(proxy);
   verdict.behind = is_behind(cloud, margin, contact.deepest);
   verdict.hidden = proxy.seen && proxy.low > edge_step * r_c + margin;
   if (!frame_judged_) {
@@ -237,7 +241,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
 
   if (contact.touching) {
     const Look& hand = look_at(cloud, contact.hip - contact.carried, hand_radius * r_c, hand_);
-    const bool free = hand.seen && hand.clear > r_c + margin_at(hand.distance);
+    const bool free = hand.seen && hand.clear > r_c + margin_of(hand);
     proved_ = proved_ && hand.seen && hand.behind > 0.0;
     if (side_ == Side::behind) {
       if (free && (contact.hip - contact.proxy).norm() > contact.deepest + margin)

@@ -149,18 +149,23 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
 double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noexcept {
   const std::array<Scatter, rungs>& scatters = scatter_[camera];
   const Scatter& scatter = scatters[rung];
-  // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
-  const double most = 4.0 * spread_ + 0.1 * detail();
   const double floor = squared(least_sd * detail());
+  // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
+  // What moves them all by more is motion, if only of a camera that shakes.
+  const double rounding = 0.1 * detail();
+  const double most = squared(2.0 * spread_ + rounding) + floor;
   const double reading = noisier_[camera] * usual_noise(camera);
-  const double usual = squared(std::min(reading, most)) + 0.03 * squared(spread_) + floor;
+  const double usual =
+      squared(std::min(reading, 4.0 * spread_ + rounding)) + 0.03 * squared(spread_) + floor;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
   double wider = 0.0;
   for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatters[j].variance);
+  wider = std::min(wider, most);
   if (scatter.samples < 1.0) return std::max(usual, wider);
-  const double measured = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
-                                    std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
-                          floor;
+  const double scattered =
+      std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
+                std::min(scatter.at_rest, 4.0 * scatter.variance)});
+  const double measured = std::min(scattered + floor, most);
   if (scatter.samples > static_cast<double>(upper_bounds.size())) return measured;
   const double largest =
       upper_bounds[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + floor);

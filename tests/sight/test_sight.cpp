@@ -740,11 +740,12 @@ TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
   }
 }
 
-// By a camera 0.75 m above the plane z = 0, with pixels 12.5 mm wide there.
-// @param depth  [m] along the axis, of a viewing ray
+// By a camera 0.75 m above the plane z = 0.
+// @param f      [px] focal length
+// @param depth  [m] along the axis, of a viewing ray; 0: not measured
 template <class Depth>
-DepthImage coarse_from_above(const Depth& depth) {
-  const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 39.5, .cy = 29.5};
+DepthImage from_above(double f, const Depth& depth) {
+  const Intrinsics k{.width = 80, .height = 60, .fx = f, .fy = f, .cx = 39.5, .cy = 29.5};
   const auto rays = std::make_shared<ViewingRays>(k);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
@@ -754,6 +755,43 @@ DepthImage coarse_from_above(const Depth& depth) {
     for (int u = 0; u < k.width; ++u)
       readings.push_back(static_cast<std::uint16_t>(depth(rays->ray(u, v)) * 1e4));
   return DepthImage(rays, std::move(readings), 1e4, pose);
+}
+
+// With pixels 12.5 mm wide there.
+template <class Depth>
+DepthImage coarse_from_above(const Depth& depth) {
+  return from_above(60.0, depth);
+}
+
+TEST(Sight, StaysOnASurfaceOfWhichManyPixelsAreNotMeasured) {
+  // As a screen before a Kinect: pixels of 2 mm and holes of 14 mm, elsewhere in each frame. The
+  // points let a proxy through that was in front of what was fitted to them.
+  constexpr int seeds = 6;
+  constexpr int frames = 90;
+  int behind = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    std::mt19937 random(static_cast<unsigned>(seed));
+    std::normal_distribution<double> noise(0.0, 2e-3);
+    std::uniform_real_distribution<double> place(-0.04, 0.04);
+    Sight sight = seated({0, 0, 0.05});
+    std::vector<DepthImage> images;  // as long as the frames are in use
+    images.reserve(frames);
+    for (int frame = 0; frame < frames; ++frame) {
+      std::array<Vec2, 24> holes;
+      for (Vec2& hole : holes) hole = Vec2(place(random), place(random));
+      images.push_back(from_above(375.0, [&](const Vec2& ray) {
+        const bool is_hole = std::any_of(holes.begin(), holes.end(), [&](const Vec2& hole) {
+          return (0.75 * ray - hole).norm() < 7e-3;
+        });
+        return is_hole ? 0.0 : 0.75 + noise(random);
+      }));
+      const Tick tick = live_through(sight, images.back(), frame * interval, [](double t) {
+        return Vec3(0, 0, std::max(0.05 - 0.1 * t, -0.012));
+      });
+      behind += tick.proxy.z() < 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_LE(behind, 10) << "of " << seeds * frames << " frames; 22 where the points alone decide";
 }
 
 TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {

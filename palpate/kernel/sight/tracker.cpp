@@ -481,18 +481,30 @@ std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, cons
 
 std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const Vec3& before,
                                            const Vec3& after, double radius) noexcept {
+  if (!tracking() || holding()) return std::nullopt;
+  const auto from_fit = [this](const Vec3& place) {
+    return surface_.contact(place, surface_.stamp(), surface_.resolution());
+  };
+  const SurfaceContact there = from_fit(after);
+  const bool crossed = !there.at_limit && there.distance < 0.0 && from_fit(before).distance >= 0.0;
   // A proxy that goes round an edge has the surface beside or behind it all the way, or comes from
   // farther away.
   const double farthest = 4.0 * radius;
   const double way = (after - before).norm();
-  if (!tracking() || holding() || views_[surface_.camera()].outline != Outline::whole ||
-      way < 0.5 * radius || way > farthest)
-    return std::nullopt;
+  const bool may_have_passed =
+      way >= 0.5 * radius && way <= farthest && views_[surface_.camera()].outline == Outline::whole;
+  if (!crossed && !may_have_passed) return std::nullopt;
   const Cloud& cloud = *clouds.of(best_camera(clouds, after));
-  const std::optional<Seen> now = look_at(cloud, after, radius);
+  std::optional<Seen> now = look_at(cloud, after, radius);
+  // Where nothing is measured, as in a hole of a screen's image, what is around it counts.
+  const bool is_hole = !now && crossed && surface_.coarseness() == 1.0;
+  if (is_hole) now = look_at(cloud, after, 3.0 * radius);
   if (!now || now->above < 0.0 || now->above > farthest) return std::nullopt;
-  const std::optional<Seen> then = look_at(cloud, before, radius);
-  if (!then || then->above > 0.0 || then->above < -farthest) return std::nullopt;
+  if (is_hole) return there.foot + radius * there.normal;
+  if (!crossed) {
+    const std::optional<Seen> then = look_at(cloud, before, radius);
+    if (!then || then->above > 0.0 || then->above < -farthest) return std::nullopt;
+  }
   return after + (now->above + radius) * now->line;
 }
 

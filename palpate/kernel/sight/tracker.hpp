@@ -62,8 +62,8 @@ class SightTracker {
   bool slide(const ObservedClouds& clouds, const Vec3& foot) noexcept;
 
   /// Where to put a proxy that passed through a surface on its way from `before` to `after` [m,
-  /// world]: in front of it, on the line of sight through `after`. None if it passed through
-  /// nothing, or went round an edge.
+  /// world]: in front of it, on the line of sight through `after`, or of the fit, if that is in a
+  /// hole of the image. None if it passed through nothing, or went round an edge.
   /// @param radius  [m] of the proxy
   [[nodiscard]] std::optional<Vec3> in_front(const ObservedClouds& clouds, const Vec3& before,
                                              const Vec3& after, double radius) noexcept;

@@ -2,7 +2,9 @@
 // What an operator does with the simulated arm over a link with delay: presses a box that moves,
 // strokes along an edge, rests in the arm's shadow. All of it stepped, the same every time.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 
 #include <gtest/gtest.h>
 
@@ -18,20 +20,27 @@ INSTANTIATE_TEST_SUITE_P(Delays, Tasks, ::testing::Values(0.0, 0.25),
                          [](const auto& one) { return one.param > 0.0 ? "Far" : "Near"; });
 
 TEST_P(Tasks, PressesABoxThatMoves) {
-  // Against the side that the camera sees, and 40 mm on.
-  const HipPath path({{0.0, {0.10, 0.0, 0.05}},
-                      {2.5, {0.10, 0.0, 0.05}},
-                      {3.5, {0.10, 0.06, 0.05}},
-                      {8.0, {0.10, 0.105, 0.05}}});
-  ScriptedDevice hand(path, false);
-  Task task(exact, hand, GetParam(), {.press_share = 1.0});
-  const double before = task.simulation().pose("box").translation().y();
-  double hardest = 0.0;
-  task.run(10.0, [&](const ServoTick&) {
-    hardest = std::max(hardest, task.simulation().truth().tip_force.norm());
-  });
-  EXPECT_GT(task.simulation().pose("box").translation().y() - before, 0.015);
-  EXPECT_LT(hardest, 8.0);
+  // Against the side that the camera sees, and 40 mm on. The tool hides most of that side: how far
+  // the box gets changes with tenths of a millimetre of the hand, so that one hand says little.
+  std::array<double, 3> moved{};
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    const double x = 0.10 + 0.5e-3 * static_cast<double>(i);
+    const HipPath path({{0.0, {x, 0.0, 0.05}},
+                        {2.5, {x, 0.0, 0.05}},
+                        {3.5, {x, 0.06, 0.05}},
+                        {8.0, {x, 0.105, 0.05}}});
+    ScriptedDevice hand(path, false);
+    Task task(exact, hand, GetParam(), {.press_share = 1.0});
+    const double before = task.simulation().pose("box").translation().y();
+    double hardest = 0.0;
+    task.run(10.0, [&](const ServoTick&) {
+      hardest = std::max(hardest, task.simulation().truth().tip_force.norm());
+    });
+    moved[i] = task.simulation().pose("box").translation().y() - before;
+    EXPECT_LT(hardest, 8.0) << x;
+  }
+  std::sort(moved.begin(), moved.end());
+  EXPECT_GT(moved[1], 0.015);
 }
 
 TEST_P(Tasks, StrokesAlongAnEdge) {

@@ -683,6 +683,48 @@ TEST(Cycle, CountsWhatItDid) {
   EXPECT_EQ(statistics.interventions[6], 1U) << "disengaged once, at the start";
 }
 
+// Hazard: another-hand
+TEST(LinkedHands, CallTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
+  CycleStatistics hand;
+  const double never = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(is_in_trouble(hand, 5.0, never)) << "its first tick is yet to come";
+  EXPECT_TRUE(is_in_trouble(hand, 5.0, 0.01));
+  EXPECT_TRUE(is_in_trouble(hand, 0.005, 0.01)) << "wherever the clock began";
+  hand.ticks = 1;
+  hand.last_t = 4.995;
+  EXPECT_FALSE(is_in_trouble(hand, 5.0, 0.01));
+  EXPECT_TRUE(is_in_trouble(hand, 5.006, 0.01));
+  EXPECT_FALSE(is_in_trouble(hand, 5.006, never));
+  for (const std::uint32_t flag : {stalled, frame_late, frame_lost, disengaged, ramping}) {
+    hand.safety = flag;
+    EXPECT_FALSE(is_in_trouble(hand, 5.0, 0.01)) << flag;
+  }
+  hand.safety = fault_latched;
+  EXPECT_TRUE(is_in_trouble(hand, 5.0, 0.01));
+  hand.safety = 0;
+  const auto fault = [](DeviceFault of) {
+    return static_cast<std::uint32_t>(of) << hand_fault_shift | hand_fault;
+  };
+  hand.hand = fault(DeviceFault::disconnected);
+  EXPECT_TRUE(is_in_trouble(hand, 5.0, 0.01));
+  hand.hand = fault(DeviceFault::another_hand);
+  EXPECT_FALSE(is_in_trouble(hand, 5.0, 0.01)) << "or two hands would hold each other for ever";
+}
+
+// Hazard: another-hand
+TEST(LinkedHands, StopOneAnotherAndKeepTheirOwnFaults) {
+  Session session;
+  const auto other = std::make_shared<CycleStatistics>();
+  session.cycle.link({other}, std::numeric_limits<double>::infinity());
+  session.run_for(0.5);
+  EXPECT_GT(session.press_to(-0.002).force.z(), 0.5);
+  other->safety = fault_latched;
+  EXPECT_EQ(fault_of(session.run().hand), DeviceFault::another_hand);
+  EXPECT_TRUE(session.run_for(1.0).force.isZero(0.0));
+  session.device.hand.fault = DeviceFault::disconnected;
+  EXPECT_EQ(fault_of(session.run().hand), DeviceFault::disconnected);
+}
+
 TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
   if (!test::memory_is_counted) GTEST_SKIP() << "sanitizers bring their own new and delete";
   const test::MemoryCalls calls;

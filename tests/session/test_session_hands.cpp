@@ -294,33 +294,6 @@ TEST(SessionHands, OfAGripperPushEachOtherApart) {
   EXPECT_NEAR(other.z(), 2.4, 0.1);
 }
 
-// Hazard: another-hand
-TEST(LinkedHands, CallTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
-  CycleStatistics hand;
-  const double never = std::numeric_limits<double>::infinity();
-  EXPECT_FALSE(is_in_trouble(hand, 5.0, never)) << "its first tick is yet to come";
-  EXPECT_TRUE(is_in_trouble(hand, 5.0, 0.01));
-  hand.ticks = 1;
-  hand.last_t = 4.995;
-  EXPECT_FALSE(is_in_trouble(hand, 5.0, 0.01));
-  EXPECT_TRUE(is_in_trouble(hand, 5.006, 0.01));
-  EXPECT_FALSE(is_in_trouble(hand, 5.006, never));
-  for (const std::uint32_t flag : {stalled, frame_late, frame_lost, disengaged, ramping}) {
-    hand.safety = flag;
-    EXPECT_FALSE(is_in_trouble(hand, 5.0, 0.01)) << flag;
-  }
-  hand.safety = fault_latched;
-  EXPECT_TRUE(is_in_trouble(hand, 5.0, 0.01));
-  hand.safety = 0;
-  const auto fault = [](DeviceFault of) {
-    return static_cast<std::uint32_t>(of) << hand_fault_shift | hand_fault;
-  };
-  hand.hand = fault(DeviceFault::disconnected);
-  EXPECT_TRUE(is_in_trouble(hand, 5.0, 0.01));
-  hand.hand = fault(DeviceFault::another_hand);
-  EXPECT_FALSE(is_in_trouble(hand, 5.0, 0.01)) << "or two hands would hold each other for ever";
-}
-
 // In real time.
 
 // Presses and hovers in turn, hangs in `read` while it is told to, and keeps what

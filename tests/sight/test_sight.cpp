@@ -757,12 +757,6 @@ DepthImage from_above(double f, const Depth& depth) {
   return DepthImage(rays, std::move(readings), 1e4, pose);
 }
 
-// With pixels 12.5 mm wide there.
-template <class Depth>
-DepthImage coarse_from_above(const Depth& depth) {
-  return from_above(60.0, depth);
-}
-
 TEST(Sight, StaysOnASurfaceOfWhichManyPixelsAreNotMeasured) {
   // As a screen before a Kinect: pixels of 2 mm and holes of 14 mm, elsewhere in each frame. The
   // points let a proxy through that was in front of what was fitted to them.
@@ -796,8 +790,8 @@ TEST(Sight, StaysOnASurfaceOfWhichManyPixelsAreNotMeasured) {
 
 TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
   // 40 mm of bar before pixels 12.5 mm wide: no quadric describes so few points with two edges.
-  const DepthImage image = coarse_from_above(
-      [](const Vec2& ray) { return std::abs(ray.x()) * 0.75 <= 0.02 ? 0.75 : 0.85; });
+  const DepthImage image = from_above(
+      60.0, [](const Vec2& ray) { return std::abs(ray.x()) * 0.75 <= 0.02 ? 0.75 : 0.85; });
   Sight sight = seated({0.004, 0.0, 0.05});
   Tick tick;
   for (int frame = 0; frame < 60; ++frame) {
@@ -821,7 +815,7 @@ TEST(Sight, RestsOnACanNarrowerThanItsDiscs) {
   images.reserve(60);
   double mean = 0.0;  // [m] over the last second
   for (int frame = 0; frame < 60; ++frame) {
-    images.push_back(coarse_from_above(depth));
+    images.push_back(from_above(60.0, depth));
     const Tick tick = live_through(sight, images.back(), frame * interval, [](double t) {
       return Vec3(0, 0, std::max(0.05 - 0.1 * t, -0.01));
     });

@@ -28,8 +28,6 @@ constexpr double strays = 0.05;
 constexpr double hand_radius = 2.0;
 // [-] pixels: radius of the narrowest footprint. It holds some ten.
 constexpr double narrowest = 1.8;
-// [-] Where holes leave too few points, a footprint is widened by this, up to twice.
-constexpr double widening = 3.0;
 constexpr double least_margin = 0.2;  // [detail] rounding of depth, in common cameras
 // [-] footprint's radius: a look without an edge has 80 % of its points within this along the line
 // of sight, and the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.

@@ -151,7 +151,7 @@ double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noe
   const Scatter& scatter = scatters[rung];
   const double floor = squared(least_sd * detail());
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
-  // What moves them all by more is motion, if only of a camera that shakes.
+  // What moves them all by more than twice that is motion, if only of a camera that shakes.
   const double rounding = 0.1 * detail();
   const double most = squared(2.0 * spread_ + rounding) + floor;
   const double reading = noisier_[camera] * usual_noise(camera);

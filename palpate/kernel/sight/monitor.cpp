@@ -161,7 +161,7 @@ const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, dou
                                       Look& last) noexcept {
   if (last.fresh && (place - last.place).norm() < look_serves * parameters_.detail) return last;
   radius = std::max(radius, narrowest * cloud.spacing(place));
-  for (int i = 0; i < 3; ++i, radius *= widening) {
+  for (int i = 0; i < 3; ++i, radius *= hole_widening) {
     look(cloud, place, radius, i > 0, last);
     if (last.seen) break;
   }
@@ -257,8 +257,8 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   if (verdict.behind && (proved_ || frames_behind_ >= parameters_.evidence_frames)) {
     verdict.action = Action::return_to_front;
     // The median of a wider or steeper look may be far from the surface at the proxy.
-    verdict.again = std::exchange(
-        proved_, proxy.radius <= widening * r_c && proxy.high - proxy.low <= proxy.radius + margin);
+    verdict.again = std::exchange(proved_, proxy.radius <= hole_widening * r_c &&
+                                               proxy.high - proxy.low <= proxy.radius + margin);
   }
   if (verdict.action == Action::return_to_front) {
     verdict.normal = proxy.line;

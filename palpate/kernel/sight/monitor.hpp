@@ -14,7 +14,7 @@ namespace palpate {
 /// 90 m/s^2 moves 50 mm in an interval at 30 Hz. Nor is a proxy brought back that lies deeper.
 inline constexpr double farthest_strike = 13.0;
 /// [-] Where holes leave too few points, a footprint is widened by this; the monitor's up to twice.
-inline constexpr double widening = 3.0;
+inline constexpr double hole_widening = 3.0;
 
 /// The last word on a contact: checks hand and proxy against what the newest frame itself measures
 /// on their lines of sight. It estimates nothing and trusts no fit. docs/sight.md, 7.

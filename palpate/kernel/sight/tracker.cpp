@@ -498,7 +498,7 @@ std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const V
   std::optional<Seen> now = look_at(cloud, after, radius);
   // Where nothing is measured, as in a hole of a screen's image, what is around it counts.
   const bool is_hole = !now && crossed && surface_.coarseness() == 1.0;
-  if (is_hole) now = look_at(cloud, after, widening * radius);
+  if (is_hole) now = look_at(cloud, after, hole_widening * radius);
   if (!now || now->above < 0.0 || now->above > farthest) return std::nullopt;
   if (is_hole) return there.foot + radius * there.normal;
   if (!crossed) {
